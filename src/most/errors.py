@@ -1,0 +1,13 @@
+"""What a user can cause: each message says what, where, what was expected, what was found, and what to do."""
+
+
+class MostError(Exception):
+    """Base of all errors a user can put right; entry points print its message alone and exit with code 2."""
+
+
+class ConfigError(MostError):
+    """A configuration value that is unknown, of the wrong type, or out of range."""
+
+
+class DataError(MostError):
+    """A file or folder that is missing or does not hold what its format says."""
