@@ -1,0 +1,28 @@
+"""What every backbone takes and gives."""
+
+from dataclasses import dataclass
+
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from most.sparse import SparseTensor
+
+
+@dataclass
+class BackboneFeatures:
+    """The two outputs of a backbone (paper, figure 2)."""
+
+    voxels: Float[Tensor, "voxels channels"]  # one row a voxel of the input, in its order
+    bev: Float[Tensor, "batch channels x y"]  # F^bev: cells of ``bev_stride`` voxels, from the grid's lower corner
+
+
+class Backbone(nn.Module):
+    """A network from the features of occupied voxels to features of the same voxels and of a bird's-eye view."""
+
+    voxel_channels: int
+    bev_channels: int
+    bev_stride: int  # voxels along the side of a BEV cell; the map has ceil(size / stride) cells along an axis
+
+    def forward(self, x: SparseTensor) -> BackboneFeatures:
+        """Encode a batch of voxel grids."""
+        raise NotImplementedError
