@@ -1,0 +1,72 @@
+"""What a dataset's reader offers. Adding a dataset is one reader, one taxonomy and one YAML file.
+
+``tests/datasets/test_reader_contract.py`` runs over all readers and says in code what is promised here.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from jaxtyping import Float64, Int64
+from torch import Tensor
+
+from most.datasets.taxonomy import Taxonomy
+from most.structures import Sweep
+
+SPLITS = ("train", "val", "test")
+
+
+@dataclass(frozen=True, order=True)
+class Frame:
+    """Names one sweep: its sequence, and its number there, which is also its row among the sequence's poses."""
+
+    sequence: str
+    index: int
+
+    @property
+    def name(self) -> str:
+        """The stem of the sweep's files."""
+        return f"{self.index:06d}"
+
+
+class Reader(Protocol):
+    """Reads one dataset; all errors are DataErrors that name file, expectation, finding and remedy."""
+
+    root: Path
+    taxonomy: Taxonomy
+
+    def sequences(self, split: str) -> list[str]:
+        """The split's sequences that are on disk."""
+        ...
+
+    def frames(self, split: str) -> list[Frame]:
+        """All sweeps of a split, by sequence and number."""
+        ...
+
+    def frames_of(self, sequence: str) -> list[Frame]:
+        """All sweeps of one sequence, by number."""
+        ...
+
+    def has_labels(self, sequence: str) -> bool:
+        """Whether the sequence is annotated; those of a test split usually are not."""
+        ...
+
+    def sweep(self, frame: Frame) -> Sweep:
+        """Read points, pose, time and, where there are any, raw labels."""
+        ...
+
+    def labels(self, frame: Frame) -> Int64[Tensor, "points"]:
+        """Read the raw labels alone; the scan need not be there."""
+        ...
+
+    def poses(self, sequence: str) -> Float64[Tensor, "rows 4 4"]:
+        """World_from_sensor by frame number."""
+        ...
+
+    def sources(self, sequence: str) -> tuple[list[Path], list[Path]]:
+        """Files that the sequence's labelled sweeps are made of: large ones, and small ones."""
+        ...
+
+    def prediction_path(self, folder: Path, frame: Frame) -> Path:
+        """Where a submission keeps its labels of a frame."""
+        ...

@@ -1,0 +1,38 @@
+"""The order of samples: shuffled by (seed, epoch), so that a resumed run goes on exactly as it would have."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from torch import distributed
+from torch.utils.data import Sampler
+
+from most.datasets.dataset import WindowDataset
+
+
+class EpochSampler(Sampler[int]):
+    """A shuffled epoch of a dataset, shared out evenly among the processes of a distributed run.
+
+    ``set_epoch``, which Lightning calls, reaches the dataset's augmentation as well. Where processes do not divide the
+    samples evenly, a few are seen twice: all processes must take the same number of steps.
+    """
+
+    def __init__(self, dataset: WindowDataset, seed: int, epoch: int = 0) -> None:
+        self.dataset = dataset
+        self.seed = seed
+        joined = distributed.is_available() and distributed.is_initialized()
+        self.rank = distributed.get_rank() if joined else 0
+        self.processes = distributed.get_world_size() if joined else 1
+        self.set_epoch(epoch)
+
+    def set_epoch(self, epoch: int) -> None:
+        """Choose the order, and what augmentation draws."""
+        self.epoch = epoch
+        self.dataset.set_epoch(epoch)
+
+    def __len__(self) -> int:
+        return -(-len(self.dataset) // self.processes)
+
+    def __iter__(self) -> Iterator[int]:
+        order = np.random.default_rng([self.seed, self.epoch]).permutation(len(self.dataset))
+        share = np.arange(self.rank, len(self) * self.processes, self.processes) % len(self.dataset)
+        return iter(order[share].tolist())

@@ -1,0 +1,238 @@
+"""SemanticKITTI: ``root/sequences/NN/{velodyne/*.bin, labels/*.label, calib.txt, poses.txt, times.txt}``.
+
+Scans hold float32 (x, y, z, remission) rows. ``poses.txt`` has the left camera's pose in the frame of the first camera
+image, a 3 x 4 matrix a row, row i for scan i; ``calib.txt`` has camera_from_lidar as ``Tr``. The lidar's pose in the
+frame of the first scan is therefore ``Tr^-1 P Tr``. Both text files cover the whole drive: more rows than scans are
+normal.
+"""
+
+import re
+import warnings
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Float32, Float64, Int64
+from torch import Tensor
+
+from most.datasets.labels import read_labels
+from most.datasets.reader import SPLITS, Frame
+from most.datasets.taxonomy import Taxonomy
+from most.errors import ConfigError, DataError
+from most.geometry.poses import invert
+from most.structures import Sweep
+
+POINT = np.dtype(("<f4", 4))  # x, y, z, remission
+POSE_NUMBERS = 12
+
+
+@dataclass
+class Splits:
+    """Sequences of each split, two digits each; the defaults are the official ones."""
+
+    train: list[str] = field(default_factory=lambda: ["00", "01", "02", "03", "04", "05", "06", "07", "09", "10"])
+    val: list[str] = field(default_factory=lambda: ["08"])
+    test: list[str] = field(default_factory=lambda: [str(number) for number in range(11, 22)])
+
+    def __post_init__(self) -> None:
+        for split in SPLITS:
+            names = [str(name) for name in getattr(self, split)]
+            if any(not re.fullmatch(r"\d\d", name) for name in names):
+                quoted = ", ".join(f"'{name:0>2}'" for name in names)
+                raise ConfigError(
+                    f"dataset.splits.{split}: expected quoted sequence names of two digits, found "
+                    f"[{', '.join(names)}]; YAML reads an unquoted 07 as the number 7: write [{quoted}]"
+                )
+
+
+class SemanticKITTI:
+    """Reads a SemanticKITTI tree; :class:`most.datasets.reader.Reader` says what each method promises."""
+
+    def __init__(self, root: str | Path, splits: Splits | None = None) -> None:
+        self.root = Path(root).expanduser()
+        self.splits = splits or Splits()
+        self.taxonomy = Taxonomy.load("semantickitti")
+        self._poses: dict[str, Tensor] = {}
+        self._times: dict[str, Tensor] = {}
+
+    def folder(self, sequence: str) -> Path:
+        """The folder of one sequence."""
+        return self.root / "sequences" / sequence
+
+    def sequences(self, split: str) -> list[str]:
+        """The split's sequences that are on disk: warns about missing ones, raises a DataError when all are."""
+        if split not in SPLITS:
+            raise ConfigError(f"split: expected one of {', '.join(SPLITS)}, found {split!r}")
+        wanted = getattr(self.splits, split)
+        present = [name for name in wanted if self.folder(name).is_dir()]
+        if not present:
+            raise DataError(self._explain_missing(split, wanted))
+        if missing := [name for name in wanted if name not in present]:
+            warnings.warn(f"{self.root}: {split}: sequences {', '.join(missing)} are not there", stacklevel=1)
+        for name in present:
+            if split != "test" and not self.has_labels(name):
+                raise DataError(
+                    f"{self.folder(name) / 'labels'}: expected the labels of a sequence of the split {split}, found no "
+                    f"folder; add them, or leave the sequence out: dataset.splits.{split}=[...]"
+                )
+        return present
+
+    def frames(self, split: str) -> list[Frame]:
+        """All scans of a split."""
+        return [frame for sequence in self.sequences(split) for frame in self.frames_of(sequence)]
+
+    def labelled_frames(self, split: str) -> list[Frame]:
+        """All frames of a split that have a label file; for scoring, which needs no scans."""
+        return [frame for name in self.sequences(split) for frame in self._list(name, "labels", "label")]
+
+    def frames_of(self, sequence: str) -> list[Frame]:
+        """All scans of a sequence, by number."""
+        return self._list(sequence, "velodyne", "bin")
+
+    def has_labels(self, sequence: str) -> bool:
+        """Whether the sequence has a folder of labels."""
+        return (self.folder(sequence) / "labels").is_dir()
+
+    def sweep(self, frame: Frame) -> Sweep:
+        """Read a scan with its pose, time and labels; non-finite points stay, since every point needs a label."""
+        points = read_scan(self.folder(frame.sequence) / "velodyne" / f"{frame.name}.bin")
+        labels = self.labels(frame) if self.has_labels(frame.sequence) else None
+        if labels is not None and len(labels) != len(points):
+            raise DataError(
+                f"{self._label_path(frame)}: expected a label for each of the scan's {len(points)} points, "
+                f"found {len(labels)}; scan and labels are of different releases or one is cut off"
+            )
+        pose, time = self.pose(frame), self._row(self.times(frame.sequence), frame, "times.txt")
+        return Sweep(frame.sequence, frame.index, points, pose, float(time), labels)
+
+    def labels(self, frame: Frame) -> Int64[Tensor, "points"]:
+        """Read the raw labels of a frame."""
+        return read_labels(self._label_path(frame))
+
+    def pose(self, frame: Frame) -> Float64[Tensor, "4 4"]:
+        """World_from_sensor of one frame."""
+        return self._row(self.poses(frame.sequence), frame, "poses.txt")
+
+    def poses(self, sequence: str) -> Float64[Tensor, "rows 4 4"]:
+        """World_from_sensor by frame number, float64; the world is the sensor frame of the drive's first scan."""
+        if sequence not in self._poses:
+            self._poses[sequence] = read_poses(self.folder(sequence))
+        return self._poses[sequence]
+
+    def times(self, sequence: str) -> Float64[Tensor, "rows"]:
+        """Time of each scan in seconds, by frame number."""
+        if sequence not in self._times:
+            self._times[sequence] = read_rows(self.folder(sequence) / "times.txt", 1)[:, 0]
+        return self._times[sequence]
+
+    def sources(self, sequence: str) -> tuple[list[Path], list[Path]]:
+        """The scans and label files of a sequence, and its poses, calibration and times."""
+        folder, frames = self.folder(sequence), self.frames_of(sequence)
+        scans = [folder / "velodyne" / f"{frame.name}.bin" for frame in frames]
+        labels = [self._label_path(frame) for frame in frames]
+        texts = [folder / name for name in ("poses.txt", "calib.txt", "times.txt")]
+        for path in labels + texts:
+            if not path.is_file():
+                raise DataError(f"{path}: expected a file beside the sequence's {len(frames)} scans, found none")
+        return scans + labels, texts
+
+    def prediction_path(self, folder: str | Path, frame: Frame) -> Path:
+        """Where a submission keeps its labels of a frame."""
+        return Path(folder) / "sequences" / frame.sequence / "predictions" / f"{frame.name}.label"
+
+    def _label_path(self, frame: Frame) -> Path:
+        return self.folder(frame.sequence) / "labels" / f"{frame.name}.label"
+
+    def _list(self, sequence: str, kind: str, suffix: str) -> list[Frame]:
+        folder = self.folder(sequence) / kind
+        paths = sorted(folder.glob(f"*.{suffix}"))
+        if not paths:
+            raise DataError(f"{folder}: expected scans 000000.{suffix} and so on, found none; is the tree complete?")
+        for path in paths:
+            if not re.fullmatch(r"\d{6}", path.stem):
+                raise DataError(f"{path}: expected a name of six digits, found {path.stem!r}; rename or remove it")
+        return [Frame(sequence, int(path.stem)) for path in paths]
+
+    def _row(self, table: Tensor, frame: Frame, file: str) -> Tensor:
+        if frame.index >= len(table):
+            raise DataError(
+                f"{self.folder(frame.sequence) / file}: expected a row for scan {frame.name}, found {len(table)} rows; "
+                "a row belongs to each scan from 000000 on: copy the whole file"
+            )
+        return table[frame.index]
+
+    def _explain_missing(self, split: str, wanted: list[str]) -> str:
+        return (
+            f"{self.root / 'sequences'}: expected sequences of the split {split} ({', '.join(wanted)}), "
+            "found none of them.\n"
+            "Each is a folder sequences/NN with velodyne/NNNNNN.bin, labels/NNNNNN.label (not for test), calib.txt, "
+            "poses.txt and times.txt.\n"
+            "Point dataset.root or the environment variable SEMANTICKITTI_ROOT at the folder that holds sequences/,\n"
+            f"or simulate one: python -m most.simulate out={self.root}"
+        )
+
+
+def read_scan(path: Path) -> Float32[Tensor, "points 4"]:
+    """Read x, y, z (m, sensor) and remission in [0, 1]."""
+    if not path.is_file():
+        raise DataError(f"{path}: expected a scan, found no file; copy the sequence's velodyne folder again")
+    content = path.read_bytes()
+    if len(content) % POINT.itemsize:
+        raise DataError(
+            f"{path}: expected a multiple of {POINT.itemsize} bytes (float32 x, y, z, remission a point), "
+            f"found {len(content)}; the file is cut off or no scan: copy it again"
+        )
+    return torch.from_numpy(np.frombuffer(content, "<f4").astype(np.float32).reshape(-1, 4))
+
+
+def read_poses(folder: Path) -> Float64[Tensor, "rows 4 4"]:
+    """World_from_sensor by frame number, of a sequence's folder."""
+    rows = read_rows(folder / "poses.txt", POSE_NUMBERS)
+    camera = torch.eye(4, dtype=torch.float64).repeat(len(rows), 1, 1)
+    camera[:, :3] = rows.reshape(-1, 3, 4)
+    camera_from_lidar = read_calibration(folder / "calib.txt")
+    return invert(camera_from_lidar) @ camera @ camera_from_lidar
+
+
+def read_rows(path: Path, columns: int) -> Float64[Tensor, "rows columns"]:
+    """Read a text table with ``columns`` numbers a row."""
+    if not path.is_file():
+        raise DataError(f"{path}: expected a text file of {columns} number(s) a row, found no file")
+    rows = [parse_row(f"{path}, line {n + 1}", line.split(), columns) for n, line in enumerate(read_lines(path))]
+    return torch.tensor(rows, dtype=torch.float64).reshape(-1, columns)
+
+
+def read_calibration(path: Path) -> Float64[Tensor, "4 4"]:
+    """Read camera_from_lidar, the line ``Tr:`` of calib.txt."""
+    if not path.is_file():
+        raise DataError(f"{path}: expected the sequence's calibration, found no file")
+    lines = dict(line.split(":", 1) for line in read_lines(path) if ":" in line)
+    if "Tr" not in lines:
+        raise DataError(
+            f"{path}: expected a line 'Tr: ...' (camera from lidar), found {', '.join(lines) or 'no entries'}; "
+            "take calib.txt from the odometry benchmark's own archive, which has it"
+        )
+    matrix = torch.eye(4, dtype=torch.float64)
+    row = parse_row(f"{path}, Tr", lines["Tr"].split(), POSE_NUMBERS)
+    matrix[:3] = torch.tensor(row, dtype=torch.float64).reshape(3, 4)
+    return matrix
+
+
+def read_lines(path: Path) -> list[str]:
+    """Lines of a text file, without blank ones at its end."""
+    try:
+        return path.read_text().rstrip().splitlines()
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path}: expected text, found bytes that are none ({error.reason})") from error
+
+
+def parse_row(where: str, words: list[str], columns: int) -> list[float]:
+    """Turn words into ``columns`` finite numbers."""
+    try:
+        numbers = [float(word) for word in words]
+    except ValueError as error:
+        raise DataError(f"{where}: expected {columns} number(s), found {' '.join(words)!r}") from error
+    if len(numbers) != columns or not np.isfinite(numbers).all():
+        raise DataError(f"{where}: expected {columns} finite number(s), found {len(numbers)}: {' '.join(words)[:80]!r}")
+    return numbers

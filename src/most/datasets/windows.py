@@ -1,0 +1,32 @@
+"""A window of sweeps: the current one and those before it, moved into the current sensor frame (paper, section III)."""
+
+import torch
+from jaxtyping import Float32
+from torch import Tensor
+
+from most.datasets.reader import Frame
+from most.geometry.poses import relative, transform
+from most.structures import Sweep
+
+
+def previous_frames(frames: list[Frame], current: Frame, count: int) -> list[Frame]:
+    """Of the ``count`` frame numbers before the current one those that exist, latest first; fewer where it starts."""
+    before = [frame for frame in frames if current.index - count <= frame.index < current.index]
+    return sorted(before, reverse=True)
+
+
+def gather_window(current: Sweep, previous: list[Sweep]) -> Float32[Tensor, "points 5"]:
+    """x, y, z (m, current sensor frame), intensity and time (s, relative, <= 0); the current sweep's points first.
+
+    The current points keep the order of their file, non-finite ones included: each of them needs a label.
+    """
+    parts = [with_age(current.points, 0.0)]
+    for sweep in previous:
+        moved = transform(relative(current.pose, sweep.pose), sweep.points[:, :3])
+        parts.append(with_age(torch.cat([moved, sweep.points[:, 3:]], dim=1), sweep.time - current.time))
+    return torch.cat(parts)
+
+
+def with_age(points: Float32[Tensor, "points 4"], age: float) -> Float32[Tensor, "points 5"]:
+    """Add a sweep's time relative to the current one as a column."""
+    return torch.cat([points, torch.full((len(points), 1), age)], dim=1)
