@@ -1,0 +1,17 @@
+"""The benchmarks' figures: pure functions, and running totals of them for training."""
+
+from most.metrics.membership import MembershipCounts, match_detections, membership_counts
+from most.metrics.panoptic import PanopticStatistics, panoptic_figures, panoptic_statistics, per_class
+from most.metrics.running import MembershipAccuracy, PanopticQuality
+
+__all__ = [
+    "MembershipAccuracy",
+    "MembershipCounts",
+    "PanopticQuality",
+    "PanopticStatistics",
+    "match_detections",
+    "membership_counts",
+    "panoptic_figures",
+    "panoptic_statistics",
+    "per_class",
+]
