@@ -63,10 +63,10 @@ class SemanticKITTIDataModule(L.LightningDataModule):
         return WindowDataset(self.reader, frames, settings.sweeps, augment, self.instances, self.seed, settings.cache)
 
     def train_dataloader(self) -> DataLoader[Sample]:
-        """Shuffled, augmented windows, from the trainer's epoch on; an incomplete last batch is left out."""
+        """Shuffled, augmented windows, from the trainer's epoch on."""
         dataset = self.dataset("train", self.augment)
         epoch = self.trainer.current_epoch if self.trainer else 0
-        return self._loader(dataset, EpochSampler(dataset, self.seed, epoch), drop_last=True)
+        return self._loader(dataset, EpochSampler(dataset, self.seed, epoch))
 
     def val_dataloader(self) -> DataLoader[Sample]:
         """The validation split in order."""
@@ -83,11 +83,9 @@ class SemanticKITTIDataModule(L.LightningDataModule):
     def loader(self, split: str) -> DataLoader[Sample]:
         """Any split in order, not augmented."""
         dataset = self.dataset(split)
-        return self._loader(dataset, SequentialSampler(dataset), drop_last=False)
+        return self._loader(dataset, SequentialSampler(dataset))
 
-    def _loader(
-        self, dataset: WindowDataset, sampler: EpochSampler | SequentialSampler, drop_last: bool
-    ) -> DataLoader[Sample]:
+    def _loader(self, dataset: WindowDataset, sampler: EpochSampler | SequentialSampler) -> DataLoader[Sample]:
         return DataLoader(
             dataset,
             self.settings.batch_size,
@@ -95,5 +93,4 @@ class SemanticKITTIDataModule(L.LightningDataModule):
             num_workers=self.settings.workers,
             persistent_workers=self.settings.workers > 0,
             collate_fn=list,
-            drop_last=drop_last,
         )

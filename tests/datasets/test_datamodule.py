@@ -1,0 +1,123 @@
+from pathlib import Path
+
+import lightning as L
+import pytest
+import torch
+from omegaconf import OmegaConf
+
+from most.datasets.augment import Augment
+from most.datasets.datamodule import SemanticKITTIDataModule, SemanticKITTISettings
+from most.datasets.sampler import EpochSampler
+from most.datasets.semantickitti import Splits
+from most.errors import ConfigError, DataError
+from most.modal.extent import ShrinkWrap
+from most.structures import Sample
+
+
+def module(tree: Path, **options: object) -> SemanticKITTIDataModule:
+    splits = Splits(train=["00"], val=["08"], test=["11"])
+    chosen = {"workers": 0, "sweeps": 1, "tables": str(tree / "tables")} | options
+    settings = SemanticKITTISettings(str(tree), splits, **chosen)  # type: ignore[arg-type]
+    return SemanticKITTIDataModule(settings, Augment(rotation=45.0), ShrinkWrap(), seed=3)
+
+
+def names(batches: object) -> list[list[tuple[str, int]]]:
+    return [[(sample.sequence, sample.index) for sample in batch] for batch in batches]  # type: ignore[attr-defined]
+
+
+def test_batches_are_lists_of_samples(tree: Path) -> None:
+    data = module(tree, batch_size=2)
+    data.prepare_data()
+    batch = next(iter(data.train_dataloader()))
+    assert [type(sample) for sample in batch] == [Sample, Sample]
+    assert names(data.val_dataloader()) == [[("08", 0), ("08", 1)], [("08", 2)]]
+    assert names(data.test_dataloader()) == names(data.val_dataloader())
+    assert names(data.predict_dataloader()) == [[("11", 0), ("11", 1)]]
+
+
+def test_only_training_is_augmented(tree: Path) -> None:
+    data = module(tree)
+    plain = data.dataset("train")[2].points
+    assert torch.equal(data.loader("train").dataset[2].points, plain)
+    assert not torch.equal(data.train_dataloader().dataset[2].points, plain)
+
+
+def test_tables_are_made_before_training(tree: Path) -> None:
+    module(tree).prepare_data()
+    assert sorted(path.name for path in (tree / "tables").rglob("*.npz")) == ["00.npz", "08.npz"]
+
+
+def test_missing_data_fails_before_training(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"most\.simulate"):
+        module(tmp_path / "nowhere").prepare_data()
+
+
+def test_order_is_shuffled_by_seed_and_epoch(tree: Path) -> None:
+    dataset = module(tree).dataset("train")
+    orders = {}
+    for seed in (0, 1):
+        for epoch in range(6):
+            sampler = EpochSampler(dataset, seed)
+            sampler.set_epoch(epoch)
+            orders[seed, epoch] = tuple(sampler)
+            assert sorted(sampler) == [0, 1, 2, 3]
+            assert tuple(EpochSampler(dataset, seed, epoch)) == orders[seed, epoch]
+    assert len(set(orders.values())) > 4
+
+
+def test_processes_share_an_epoch_evenly(tree: Path) -> None:
+    dataset = module(tree).dataset("train")
+    shares = []
+    for rank in range(3):
+        sampler = EpochSampler(dataset, 0)
+        sampler.rank, sampler.processes = rank, 3
+        shares.append(list(sampler))
+        assert len(sampler) == len(shares[-1]) == 2
+    assert {index for share in shares for index in share} == {0, 1, 2, 3}
+
+
+class Recorder(L.LightningModule):
+    """Remembers what it was shown."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.weight = torch.nn.Parameter(torch.zeros(()))
+        self.seen: list[tuple[int, int, float]] = []
+
+    def training_step(self, batch: list[Sample]) -> torch.Tensor:
+        self.seen += [(self.current_epoch, sample.index, float(sample.points.sum())) for sample in batch]
+        return self.weight**2
+
+    def configure_optimizers(self) -> torch.optim.Optimizer:
+        return torch.optim.SGD(self.parameters(), lr=0.1)
+
+
+def fit(tree: Path, folder: Path, epochs: int, resume: Path | None = None) -> list[tuple[int, int, float]]:
+    quiet = {"logger": False, "enable_progress_bar": False, "enable_model_summary": False, "accelerator": "cpu"}
+    trainer = L.Trainer(max_epochs=epochs, default_root_dir=folder, enable_checkpointing=False, **quiet)
+    recorder = Recorder()
+    trainer.fit(recorder, datamodule=module(tree), ckpt_path=resume)
+    trainer.save_checkpoint(folder / f"{epochs}.ckpt")
+    return recorder.seen
+
+
+def test_resumed_run_sees_what_it_would_have_seen(tree: Path, tmp_path: Path) -> None:
+    whole = fit(tree, tmp_path / "whole", 3)
+    first = fit(tree, tmp_path / "parts", 1)
+    rest = fit(tree, tmp_path / "parts", 3, tmp_path / "parts" / "1.ckpt")
+    assert first + rest == whole
+    assert len({tuple(sorted(seen[1:] for seen in whole if seen[0] == epoch)) for epoch in range(3)}) == 3
+
+
+@pytest.mark.parametrize(("key", "value"), [("sweeps", -1), ("batch_size", 0), ("workers", -2)])
+def test_faulty_settings_are_refused(key: str, value: int) -> None:
+    with pytest.raises(ConfigError, match=rf"dataset\.{key}: expected at least [01], found {value}"):
+        SemanticKITTISettings(**{key: value})
+
+
+def test_settings_are_a_structured_configuration() -> None:
+    config = OmegaConf.merge(OmegaConf.structured(SemanticKITTISettings), {"sweeps": 3, "splits": {"val": ["07"]}})
+    settings = OmegaConf.to_object(config)
+    assert isinstance(settings, SemanticKITTISettings)
+    assert settings.splits.val == ["07"]
+    assert settings.splits.train[0] == "00"
