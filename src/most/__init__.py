@@ -11,3 +11,9 @@ The pipeline, stage by stage:
 7. ``most.panoptic`` fuses both into a label for every point;
 8. ``most.metrics`` scores it, ``most.viz`` draws it, ``most.stages`` trains it.
 """
+
+import os
+
+# Threads that spin while they wait for work stall each other wherever two programs share the processors. The OpenMP
+# runtime reads this when torch loads it, hence here, before anything imports torch.
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")

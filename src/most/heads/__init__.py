@@ -1,0 +1,6 @@
+"""Heads: modal centres in bird's-eye view, and classes of voxels and points."""
+
+from most.heads.centre import CentreHead, CentreMaps
+from most.heads.semantic import SemanticHead, SemanticLogits
+
+__all__ = ["CentreHead", "CentreMaps", "SemanticHead", "SemanticLogits"]

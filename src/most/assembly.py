@@ -1,0 +1,106 @@
+"""Putting the components together, and the checkpoint that takes them apart again."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from pickle import UnpicklingError
+from typing import Any
+from zipfile import BadZipFile
+
+import torch
+
+from most.config import Config, from_plain, to_plain
+from most.datasets.taxonomy import Taxonomy
+from most.errors import DataError
+from most.heads import CentreHead, SemanticHead
+from most.inference import Predictor
+from most.network import Network
+from most.voxels import Grid
+
+FORMAT = 1
+GROUPS = ("grid", "encoder", "backbone", "centre_head", "semantic_head", "membership", "inference")
+
+
+def build_network(parts: dict[str, Any], taxonomy: Taxonomy) -> Network:
+    """Make the stage-1 network of the components named in ``GROUPS``."""
+    grid: Grid = parts["grid"]
+    encoder = parts["encoder"].build(grid)
+    backbone = parts["backbone"].build(encoder.voxel_channels, grid.shape)
+    centre_head: CentreHead = parts["centre_head"]
+    semantic_head: SemanticHead = parts["semantic_head"]
+    return Network(
+        grid,
+        encoder,
+        backbone,
+        centre_head.build(backbone.bev_channels, len(taxonomy.things)),
+        semantic_head.build(
+            taxonomy.num_classes - 1, backbone.voxel_channels, encoder.point_channels, backbone.bev_channels
+        ),
+    )
+
+
+def build_predictor(network: Network, parts: dict[str, Any], taxonomy: Taxonomy) -> Predictor:
+    """Join a network with what comes after it."""
+    return Predictor(network, list(taxonomy.things), taxonomy.stuff[0], parts["membership"], parts["inference"])
+
+
+def model_parts(config: Config) -> dict[str, Any]:
+    """Pick what a trained model consists of out of a training's configuration."""
+    return {
+        "grid": config.grid,
+        "encoder": config.encoder,
+        "backbone": config.backbone,
+        "centre_head": config.heads.centre,
+        "semantic_head": config.heads.semantic,
+        "membership": config.membership,
+        "inference": config.inference,
+    }
+
+
+def describe(parts: dict[str, Any], taxonomy: Taxonomy, sweeps: int) -> dict[str, Any]:
+    """Return what a checkpoint says of its model, in plain types: it loads without running anything."""
+    return {
+        "format": FORMAT,
+        "taxonomy": {"name": taxonomy.name, "class_names": list(taxonomy.class_names), "things": list(taxonomy.things)},
+        "sweeps": sweeps,
+        "parts": {group: to_plain(group, part) for group, part in parts.items()},
+    }
+
+
+@dataclass
+class Trained:
+    """A trained model and all that prediction needs beside it."""
+
+    predictor: Predictor
+    taxonomy: Taxonomy
+    sweeps: int  # previous sweeps in its window
+
+
+def load_trained(path: Path) -> Trained:
+    """Read a checkpoint; a file that is none, or of another taxonomy, is a DataError."""
+    checkpoint = read_checkpoint(path)
+    description = checkpoint["most"]
+    taxonomy = Taxonomy.load(description["taxonomy"]["name"])
+    if list(taxonomy.class_names) != description["taxonomy"]["class_names"]:
+        raise DataError(f"{path}: expected the classes of taxonomy {taxonomy.name}, found others; train it again")
+    parts = {group: from_plain(group, description["parts"][group]) for group in GROUPS}
+    network = build_network(parts, taxonomy)
+    prefix = "network."
+    weights = {key[len(prefix) :]: value for key, value in checkpoint["state_dict"].items() if key.startswith(prefix)}
+    network.load_state_dict(weights)
+    network.eval()
+    return Trained(build_predictor(network, parts, taxonomy), taxonomy, description["sweeps"])
+
+
+def read_checkpoint(path: Path) -> dict[str, Any]:
+    """Read a checkpoint of ours without running any code in it."""
+    if not path.is_file():
+        raise DataError(f"{path}: expected a checkpoint, found no file")
+    try:
+        checkpoint = torch.load(path, map_location="cpu", weights_only=True)
+    except (UnpicklingError, BadZipFile, RuntimeError, EOFError, ValueError) as error:
+        raise DataError(f"{path}: expected a checkpoint, found something else or a truncated one ({error})") from error
+    if not isinstance(checkpoint, dict) or "most" not in checkpoint:
+        raise DataError(f"{path}: expected a checkpoint of most.train, found one of another program")
+    if checkpoint["most"]["format"] != FORMAT:
+        raise DataError(f"{path}: expected checkpoint format {FORMAT}, found {checkpoint['most']['format']}")
+    return dict(checkpoint)

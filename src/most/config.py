@@ -1,0 +1,129 @@
+"""The configuration's schema: every component is its own, and this module puts them together.
+
+``Config`` is the root. A YAML file under ``conf/<group>/`` names its schema in its defaults (``<name>_schema``), so an
+unknown key or a wrong type is refused when the configuration is composed; ranges are checked by ``typed``, which turns
+the composed configuration into the components themselves.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from hydra.core.config_store import ConfigStore
+from omegaconf import DictConfig, ListConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from most.backbones import AsymmetricUNetSettings, AsymmetricUNetSmallSettings, ResidualUNetSettings
+from most.datasets.augment import Augment
+from most.datasets.datamodule import SemanticKITTISettings
+from most.encoder import PointEncoder
+from most.errors import ConfigError
+from most.heads import CentreHead, SemanticHead
+from most.inference import Inference
+from most.logs import LoggerSettings
+from most.membership import Nearest
+from most.modal.extent import ShrinkWrap, TrackMax
+from most.stages.detection import DetectionTraining
+from most.stages.trainer import TrainerSettings
+from most.voxels import Grid
+
+COMPONENTS: dict[str, dict[str, type]] = {
+    "dataset": {"semantickitti": SemanticKITTISettings},
+    "augment": {"augment": Augment},
+    "extent": {"shrink_wrap": ShrinkWrap, "track_max": TrackMax},
+    "grid": {"grid": Grid},
+    "encoder": {"encoder": PointEncoder},
+    "backbone": {
+        "asymmetric_unet": AsymmetricUNetSettings,
+        "asymmetric_unet_small": AsymmetricUNetSmallSettings,
+        "residual_unet": ResidualUNetSettings,
+    },
+    "membership": {"nearest": Nearest},
+    "stage": {"detection": DetectionTraining},
+    "trainer": {"trainer": TrainerSettings},
+    "logger": {"logger": LoggerSettings},
+    "centre_head": {"centre_head": CentreHead},
+    "semantic_head": {"semantic_head": SemanticHead},
+    "inference": {"inference": Inference},
+}
+
+
+@dataclass
+class Heads:
+    """What reads the backbone's features."""
+
+    centre: CentreHead = field(default_factory=CentreHead)
+    semantic: SemanticHead = field(default_factory=SemanticHead)
+
+
+@dataclass
+class Paths:
+    """Where things are written."""
+
+    output: str = "outputs"  # run folders
+
+
+@dataclass
+class Config:
+    """Everything ``most.train`` is told; the fields with ``Any`` are groups whose member chooses the class."""
+
+    name: str = "most"
+    seed: int = 1
+    resume: str | None = None  # a checkpoint to go on from
+    dataset: Any = None
+    augment: Any = None
+    extent: Any = None
+    grid: Any = None
+    encoder: Any = None
+    backbone: Any = None
+    heads: Heads = field(default_factory=Heads)
+    membership: Any = None
+    inference: Inference = field(default_factory=Inference)
+    stage: Any = None
+    trainer: Any = None
+    logger: Any = None
+    paths: Paths = field(default_factory=Paths)
+
+
+def conf_dir() -> Path:
+    """The folder of YAML files: the one packed into the wheel, else the checkout's."""
+    packed = Path(__file__).parent / "conf"
+    return packed if packed.is_dir() else Path(__file__).parents[2] / "conf"
+
+
+def store_root(command: str, schema: type) -> None:
+    """Tell Hydra the root schema of a command; its YAML names it ``<command>_schema``."""
+    ConfigStore.instance().store(name=f"{command}_schema", node=schema)
+
+
+def register() -> None:
+    """Tell Hydra the schemas of all components; they get their names in ``defaults`` from here."""
+    store = ConfigStore.instance()
+    store_root("train", Config)
+    for group, members in COMPONENTS.items():
+        for name, schema in members.items():
+            store.store(group=group, name=f"{name}_schema", node=schema)
+
+
+def typed(config: DictConfig | ListConfig) -> Any:
+    """Turn a composed configuration into its components; a value out of range is a ConfigError."""
+    try:
+        return OmegaConf.to_object(config)
+    except OmegaConfBaseException as error:
+        raise ConfigError(f"{error.full_key or 'configuration'}: {error}") from error
+
+
+def to_plain(group: str, component: Any) -> dict[str, Any]:
+    """Describe a component by names, numbers, lists and dicts alone, as checkpoints keep it."""
+    name = next(name for name, schema in COMPONENTS[group].items() if schema is type(component))
+    return {"component": name, "settings": asdict(component)}
+
+
+def from_plain(group: str, plain: Mapping[str, Any]) -> Any:
+    """Make the component that ``to_plain`` described."""
+    schema = COMPONENTS[group].get(plain["component"])
+    if schema is None:
+        known = ", ".join(COMPONENTS[group])
+        raise ConfigError(f"{group}: expected one of {known}, found {plain['component']} (of a later version?)")
+    return typed(OmegaConf.merge(OmegaConf.structured(schema), plain["settings"]))

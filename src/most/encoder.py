@@ -1,0 +1,86 @@
+"""The shared point MLP and the mean of its output in each voxel (paper, section III, overview; Fig. 2)."""
+
+from dataclasses import dataclass, field
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from most.errors import ConfigError
+from most.structures import Voxels
+from most.voxels import Grid
+
+POINT_CHANNELS = 12  # position 3, intensity, time, distance, offsets from the voxel's mean 3 and middle 3
+VOXEL_CHANNELS = 6  # the raw mean: offset of the mean from the middle 3, height, intensity, log count
+
+
+@dataclass
+class PointEncoder:
+    """Widths of the point MLP's layers; the last is the width of F_point."""
+
+    widths: list[int] = field(default_factory=lambda: [64, 128, 256, 32])
+
+    def __post_init__(self) -> None:
+        if not self.widths or min(self.widths) < 1:
+            raise ConfigError(f"encoder.widths: expected at least one positive width, found {self.widths}")
+
+    def build(self, grid: Grid) -> "PointMLP":
+        """Make the network for a grid."""
+        return PointMLP(self.widths, grid)
+
+
+class PointMLP(nn.Module):
+    """Encodes every point and gathers the mean in its voxel, with the raw mean beside it."""
+
+    def __init__(self, widths: list[int], grid: Grid) -> None:
+        super().__init__()
+        self.grid = grid
+        layers: list[nn.Module] = []
+        for fan_in, fan_out in zip([POINT_CHANNELS, *widths[:-1]], widths, strict=True):
+            layers += [nn.Linear(fan_in, fan_out, bias=False), nn.BatchNorm1d(fan_out), nn.ReLU(inplace=True)]
+        self.layers = nn.Sequential(*layers)
+        self.point_channels = widths[-1]
+        self.voxel_channels = widths[-1] + VOXEL_CHANNELS
+
+    def forward(
+        self, points: Float[Tensor, "inputs 5"], voxels: Voxels
+    ) -> tuple[Float[Tensor, "inputs features"], Float[Tensor, "voxels mixed"]]:
+        """Return F_point of every point in range, and the features of every voxel."""
+        described, raw = describe(points, voxels, self.grid)
+        features = self.layers(described)
+        return features, torch.cat([voxel_mean(features, voxels), raw], 1)
+
+
+def voxel_mean(values: Float[Tensor, "inputs channels"], voxels: Voxels) -> Float[Tensor, "voxels channels"]:
+    """Average the points' values in each voxel."""
+    sums = values.new_zeros(len(voxels), values.shape[1]).index_add(0, voxels.point_voxel, values)
+    return sums / point_counts(voxels, values.dtype)[:, None]
+
+
+def point_counts(voxels: Voxels, dtype: torch.dtype) -> Float[Tensor, "voxels"]:
+    """Return how many points each voxel holds."""
+    return torch.bincount(voxels.point_voxel, minlength=len(voxels)).to(dtype)
+
+
+def describe(
+    points: Float[Tensor, "inputs 5"], voxels: Voxels, grid: Grid
+) -> tuple[Float[Tensor, "inputs 12"], Float[Tensor, "voxels 6"]]:
+    """Return the raw features of points and of voxels, scaled to about one."""
+    size, reach = points.new_tensor(grid.voxel_size), points.new_tensor(grid.upper)
+    middles = grid.middles(voxels.coordinates[:, 1:])
+    means = voxel_mean(points[:, :4], voxels)
+    index = voxels.point_voxel
+    xyz = points[:, :3]
+    described = torch.cat(
+        [
+            xyz / reach,
+            points[:, 3:],
+            xyz[:, :2].norm(dim=1, keepdim=True) / reach[0],
+            (xyz - means[index, :3]) / size,
+            ((xyz - middles[index]) / size).clamp(-2, 2),  # points clipped into the border layers lie further off
+        ],
+        1,
+    )
+    log_counts = point_counts(voxels, points.dtype).log()[:, None]
+    raw = torch.cat([((means[:, :3] - middles) / size).clamp(-2, 2), means[:, 2:], log_counts], 1)
+    return described, raw

@@ -1,0 +1,128 @@
+"""Fusion of semantics, detections and memberships into one label a point (paper, inference; Algorithm 1)."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import torch
+from jaxtyping import Float, Int64
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+from torch import Tensor
+
+from most.errors import ConfigError
+from most.membership import Pairs, RegionOfInterest
+from most.structures import Detections, Panoptic
+
+MEMBER = 0.5  # a pair belongs together above this confidence (Algorithm 1, line 10)
+UNCLAIMED = ("nearest", "cluster", "zero")
+
+
+class Membership(Protocol):
+    """Whatever rates pairs of points and centres."""
+
+    def __call__(
+        self, points: Float[Tensor, "points 3"], pairs: Pairs, detections: Detections
+    ) -> Float[Tensor, "pairs"]:
+        """Return each pair's confidence in [0, 1]."""
+        ...
+
+
+@dataclass
+class Fusion:
+    """How overlaps are resolved and what becomes of thing points that no centre claims."""
+
+    overlap: str = "confident"  # confident: the most confident membership wins; order: the most confident detection
+    unclaimed: str = "nearest"  # nearest: by a region grown by ``reach``, else cluster; cluster; zero: id 0
+    reach: float = 1.5
+    cluster_radius: float = 0.6  # m, between BEV cells of half that size
+
+    def __post_init__(self) -> None:
+        if self.overlap not in ("confident", "order"):
+            raise ConfigError(f"fusion.overlap: expected confident or order, found {self.overlap}")
+        if self.unclaimed not in UNCLAIMED:
+            raise ConfigError(f"fusion.unclaimed: expected one of {', '.join(UNCLAIMED)}, found {self.unclaimed}")
+        if self.reach < 1 or self.cluster_radius <= 0:
+            raise ConfigError("fusion: expected reach >= 1 and cluster_radius > 0")
+
+
+@dataclass
+class Assignment:
+    """Points and the centres that claim them, before and after the unclaimed are dealt with."""
+
+    claimed: Int64[Tensor, "points"]  # index of the detection whose member the point is, -1 for none
+    panoptic: Panoptic
+
+
+def fuse(
+    points: Float[Tensor, "points 3"],
+    semantics: Int64[Tensor, "points"],
+    things: list[int],
+    detections: Detections,
+    membership: Membership,
+    roi: RegionOfInterest,
+    fusion: Fusion,
+) -> Assignment:
+    """Return the panoptic labels of one sweep.
+
+    ``points`` and ``detections`` are in the sensor frame (m), ``semantics`` and ``things`` are training ids. A
+    detection's points keep their predicted class, which is the detection's own: points of another class are never
+    its members (Algorithm 1, line 7, prints this the wrong way round).
+    """
+    pairs = roi.pairs(points, semantics, detections)
+    confidence = membership(points, pairs, detections)
+    members = confidence > MEMBER
+    rank = confidence if fusion.overlap == "confident" else -pairs.detections.to(confidence.dtype)
+    claimed = _best(len(points), Pairs(pairs.points[members], pairs.detections[members]), rank[members])
+    ids = claimed + 1
+    if fusion.unclaimed != "zero":
+        left = torch.isin(semantics, torch.tensor(things, device=semantics.device)) & (claimed < 0)
+        ids[left] = _adopt(points[left], semantics[left], detections, roi, fusion)
+    return Assignment(claimed, Panoptic(semantics, ids))
+
+
+def _best(count: int, pairs: Pairs, rank: Float[Tensor, "pairs"]) -> Int64[Tensor, "points"]:
+    """Return for each point the detection of its highest-ranked pair (the first of equals), -1 where it has none."""
+    order = torch.argsort(rank, stable=True).flip(0)
+    best = torch.full((count,), -1, dtype=torch.long, device=rank.device)
+    taken, first = np.unique(pairs.points[order].cpu().numpy(), return_index=True)
+    chosen = order[torch.as_tensor(first, device=rank.device)]
+    best[torch.as_tensor(taken, device=rank.device)] = pairs.detections[chosen]
+    return best
+
+
+def _adopt(
+    points: Float[Tensor, "points 3"],
+    semantics: Int64[Tensor, "points"],
+    detections: Detections,
+    roi: RegionOfInterest,
+    fusion: Fusion,
+) -> Int64[Tensor, "points"]:
+    """Give unclaimed points of things the id of a near centre, or of a cluster of their own."""
+    ids = torch.zeros(len(points), dtype=torch.long, device=points.device)
+    if fusion.unclaimed == "nearest":
+        pairs = roi.pairs(points, semantics, detections, fusion.reach)
+        distance = (points[pairs.points] - detections.centres[pairs.detections]).norm(dim=1)
+        ids = _best(len(points), pairs, -distance) + 1
+    alone = ids == 0
+    ids[alone] = cluster(points[alone], semantics[alone], fusion.cluster_radius) + 1 + len(detections)
+    return ids
+
+
+def cluster(
+    points: Float[Tensor, "points 3"], semantics: Int64[Tensor, "points"], radius: float
+) -> Int64[Tensor, "points"]:
+    """Return connected components, counted from 0: same class, BEV cells of half ``radius`` at most ``radius`` apart.
+
+    Non-finite points of a class make one component among themselves.
+    """
+    if len(points) == 0:
+        return torch.zeros(0, dtype=torch.long, device=points.device)
+    ground = np.nan_to_num(points[:, :2].double().cpu().numpy(), nan=1e6, posinf=1e6, neginf=1e6)
+    cells = np.concatenate([np.floor(ground * 2 / radius), semantics.cpu().numpy()[:, None] * 1e9], 1)
+    occupied, cell_of = np.unique(cells, axis=0, return_inverse=True)
+    near = cKDTree(occupied).query_pairs(2.0, output_type="ndarray")
+    links = coo_array((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(occupied),) * 2)
+    component = connected_components(links, directed=False)[1]
+    return torch.as_tensor(component[cell_of.reshape(-1)], dtype=torch.long, device=points.device)

@@ -1,0 +1,56 @@
+"""Label a split with a trained model: ``python -m most.predict checkpoint=FILE split=val out=FOLDER``."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import hydra
+import torch
+from omegaconf import MISSING, DictConfig
+from torch.utils.data import DataLoader
+
+from most.assembly import load_trained
+from most.config import conf_dir, register, store_root, typed
+from most.datasets.dataset import WindowDataset
+from most.datasets.semantickitti import SemanticKITTI
+from most.entry import run
+from most.predicting import claim_folder, unfinished, write_predictions
+
+
+@dataclass
+class PredictConfig:
+    """What ``most.predict`` is told."""
+
+    checkpoint: str = MISSING
+    out: str = MISSING
+    split: str = "val"
+    dataset: Any = None
+    device: str = "auto"  # auto: a GPU where there is one
+
+
+register()
+store_root("predict", PredictConfig)
+
+
+def predict(config: PredictConfig) -> None:
+    """Write ``sequences/NN/predictions/*.label`` and ``sequences/NN/detections/*.npz`` to the folder ``out``."""
+    checkpoint, out, dataset = Path(config.checkpoint), Path(config.out), config.dataset
+    trained = load_trained(checkpoint)
+    reader = SemanticKITTI(dataset.root, dataset.splits)
+    frames = reader.frames(config.split)
+    claim_folder(out, checkpoint, config.split)
+    frames = unfinished(reader, frames, out)
+    windows = WindowDataset(reader, frames, trained.sweeps)
+    loader = DataLoader(windows, dataset.batch_size, num_workers=dataset.workers, collate_fn=list)
+    device = config.device if config.device != "auto" else "cuda" if torch.cuda.is_available() else "cpu"
+    write_predictions(trained.predictor, loader, reader, out, len(frames), torch.device(device))
+
+
+@hydra.main(version_base=None, config_path=str(conf_dir()), config_name="predict")
+def main(config: DictConfig) -> None:
+    """Compose, check, predict."""
+    run(lambda: predict(typed(config)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,68 @@
+"""Writing predictions: the official label files, and the detections beside them."""
+
+import hashlib
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import torch
+from tqdm import tqdm
+
+from most.datasets.labels import write_labels
+from most.datasets.reader import Frame, Reader
+from most.datasets.taxonomy import Taxonomy
+from most.errors import DataError
+from most.files import atomic_write
+from most.inference import Prediction, Predictor
+from most.structures import Sample
+
+RECORD = "prediction.json"
+
+
+def detections_path(prediction: Path) -> Path:
+    """Where the detections of the sweep whose labels are ``prediction`` lie."""
+    return prediction.parent.parent / "detections" / f"{prediction.stem}.npz"
+
+
+def claim_folder(out: Path, checkpoint: Path, split: str) -> None:
+    """Note in ``out`` what is written there; another model's predictions are not mixed in, the same one's go on."""
+    record = {"checkpoint_sha256": hashlib.sha256(checkpoint.read_bytes()).hexdigest(), "split": split}
+    path = out / RECORD
+    if not path.is_file():
+        if out.is_dir() and any(out.iterdir()):
+            raise DataError(f"{out}: expected a new or empty folder, found other files; choose another out")
+        with atomic_write(path, "w") as file:
+            json.dump(record, file)
+    elif json.loads(path.read_text()) != record:
+        raise DataError(f"{out}: holds predictions of another checkpoint or split; choose another out, or remove it")
+
+
+def unfinished(reader: Reader, frames: list[Frame], out: Path) -> list[Frame]:
+    """Return the frames that have no prediction yet."""
+    return [frame for frame in frames if not reader.prediction_path(out, frame).is_file()]
+
+
+@torch.inference_mode()
+def write_predictions(
+    predictor: Predictor, batches: Iterable[list[Sample]], reader: Reader, out: Path, total: int, device: torch.device
+) -> None:
+    """Label ``total`` sweeps and write each when it is done."""
+    predictor.network.eval().to(device)
+    with tqdm(total=total, desc="predict", unit="sweep") as progress:
+        for samples in batches:
+            moved = [sample.to(device) for sample in samples]
+            for sample, prediction in zip(samples, predictor(moved), strict=True):
+                path = reader.prediction_path(out, Frame(sample.sequence, sample.index))
+                write_prediction(prediction.to("cpu"), path, reader.taxonomy)
+                progress.update()
+
+
+def write_prediction(prediction: Prediction, path: Path, taxonomy: Taxonomy) -> None:
+    """Write one sweep's detections, then its labels: where labels are, all is."""
+    arrays = {name: value.numpy() for name, value in vars(prediction.detections).items()}
+    with atomic_write(detections_path(path)) as file:
+        np.savez_compressed(
+            file, roi=prediction.roi.numpy(), assigned=prediction.claimed.numpy().astype(np.int32), **arrays
+        )
+    write_labels(path, taxonomy.encode(prediction.panoptic.semantics, prediction.panoptic.ids))

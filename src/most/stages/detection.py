@@ -1,0 +1,157 @@
+"""Stage 1: the detection and segmentation network, trained jointly (paper, implementation details)."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import lightning as L
+import torch
+from jaxtyping import Float, Int64
+from lightning.pytorch.utilities.types import OptimizerLRSchedulerConfig
+from torch import Tensor
+
+from most.datasets.taxonomy import Taxonomy
+from most.errors import ConfigError
+from most.inference import Prediction, Predictor
+from most.losses import LossWeights, class_weights, focal_loss, regression_losses, semantic_loss
+from most.metrics import MembershipAccuracy, PanopticQuality
+from most.modal.heatmap import HeatmapTargets
+from most.modal.targets import bev_targets
+from most.modal.voxel_labels import majority
+from most.network import Network, NetworkOutput
+from most.structures import Sample
+
+
+@dataclass
+class DetectionTraining:
+    """Optimiser, schedule and losses of stage 1; the defaults are the paper's."""
+
+    optimizer: str = "adam"
+    max_lr: float = 1e-3
+    weight_decay: float = 0.01
+    warm_up: float = 0.4  # share of the steps in which the rate rises (one-cycle)
+    initial_divisor: float = 10.0  # the rate starts at max_lr / initial_divisor
+    clip: float = 35.0  # norm of the gradient
+    batch_size: int = 8  # effective: scans an optimiser step, over all processes and accumulated batches
+    epochs: int = 20
+    targets: HeatmapTargets = field(default_factory=HeatmapTargets)
+    losses: LossWeights = field(default_factory=LossWeights)
+
+    def __post_init__(self) -> None:
+        if self.optimizer not in ("adam", "adamw"):
+            raise ConfigError(f"stage.optimizer: expected adam or adamw, found {self.optimizer}")
+        if not 0 < self.warm_up < 1:
+            raise ConfigError(f"stage.warm_up: expected a share in (0, 1), found {self.warm_up}")
+        for name in ("max_lr", "initial_divisor", "clip", "batch_size", "epochs"):
+            if getattr(self, name) <= 0:
+                raise ConfigError(f"stage.{name}: expected a positive number, found {getattr(self, name)}")
+        if self.weight_decay < 0:
+            raise ConfigError(f"stage.weight_decay: expected a number >= 0, found {self.weight_decay}")
+
+
+class DetectionStage(L.LightningModule):
+    """Wires network, targets, losses and metrics."""
+
+    class_weights: Tensor
+
+    def __init__(
+        self,
+        predictor: Predictor,
+        taxonomy: Taxonomy,
+        class_counts: Int64[Tensor, "classes"],
+        training: DetectionTraining,
+        description: dict[str, Any],
+    ) -> None:
+        """``class_counts`` are the training split's points of each class, void first.
+
+        ``description`` goes into the checkpoints: plain types that say how to make the network again.
+        """
+        super().__init__()
+        self.network = predictor.network
+        self.predictor = predictor
+        self.taxonomy = taxonomy
+        self.training_settings = training
+        self.description = description
+        weights = class_weights(class_counts[1:], training.losses.class_balance)
+        self.register_buffer("class_weights", weights, persistent=False)
+        self.quality = PanopticQuality(taxonomy.class_names, taxonomy.things, taxonomy.min_points)
+        self.membership_accuracy = MembershipAccuracy()
+        self.report: dict[str, Any] = {}  # the last validation's figures
+
+    def losses(self, samples: list[Sample], output: NetworkOutput) -> dict[str, Float[Tensor, ""]]:
+        """Return each loss, unweighted (Eq. 1, 2, 4)."""
+        semantics = torch.cat([sample.semantics for sample in samples if sample.semantics is not None])
+        seen = torch.cat([_is_in_range(sample, self.network) for sample in samples])
+        semantics = semantics[seen]
+        voxels = output.voxels
+        voxel_semantics = majority(
+            voxels.point_voxel[output.current], semantics, len(voxels), self.taxonomy.num_classes
+        )
+        bev = self.network.bev_grid
+        targets = bev_targets(
+            [sample.instances for sample in samples if sample.instances is not None],
+            bev.lower, bev.cell, bev.shape, self.taxonomy.things, self.training_settings.targets,
+        )  # fmt: skip
+        return {
+            "voxel": semantic_loss(output.voxel_logits, voxel_semantics, self.class_weights),
+            "point": semantic_loss(output.point_logits, semantics, self.class_weights),
+            "heatmap": focal_loss(output.maps.heatmap, targets.heatmap),
+            **regression_losses(output.maps, targets),
+        }
+
+    def training_step(self, samples: list[Sample], _: int) -> Float[Tensor, ""]:
+        """One batch: every loss is logged apart, and their weighted sum is returned (Eq. 5)."""
+        losses = self.losses(samples, self.network(samples))
+        weights = self.training_settings.losses
+        total = torch.stack([getattr(weights, name) * loss for name, loss in losses.items()]).sum()
+        logged = {f"train/loss_{name}": loss.detach() for name, loss in losses.items()}
+        self.log_dict(logged | {"train/loss": total.detach()}, batch_size=len(samples))
+        return total
+
+    def validation_step(self, samples: list[Sample], _: int) -> dict[str, Any]:
+        """Predict a batch and score it."""
+        predictions = self.predict_step(samples, 0)
+        for sample, prediction in zip(samples, predictions, strict=True):
+            if sample.labels is None or sample.semantics is None or sample.instances is None:
+                continue
+            panoptic = prediction.panoptic
+            written = self.taxonomy.encode(panoptic.semantics, panoptic.ids)
+            self.quality.update(panoptic.semantics, written, sample.semantics, sample.labels)
+            self.membership_accuracy.update(
+                sample.points[: sample.num_current, :3], panoptic.semantics, sample.semantics, sample.labels,
+                prediction.detections, prediction.roi, prediction.claimed, sample.instances,
+            )  # fmt: skip
+        return {"predictions": predictions}
+
+    def on_validation_epoch_end(self) -> None:
+        """Log the split's figures, fractions in [0, 1]."""
+        figures = self.quality.compute() | self.membership_accuracy.compute()
+        self.report = {"epoch": self.current_epoch, "panoptic": figures | {"per_class": self.quality.per_class()}}
+        self.log_dict({f"val/{name}": value for name, value in figures.items()})
+        self.quality.reset()
+        self.membership_accuracy.reset()
+
+    def predict_step(self, samples: list[Sample], _: int) -> list[Prediction]:
+        """Label every point of a batch's current sweeps."""
+        return self.predictor(samples)
+
+    def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
+        """Add what it takes to make the network again."""
+        checkpoint["most"] = self.description
+
+    def configure_optimizers(self) -> OptimizerLRSchedulerConfig:
+        """Adam or AdamW under a one-cycle schedule."""
+        settings = self.training_settings
+        kind = torch.optim.AdamW if settings.optimizer == "adamw" else torch.optim.Adam
+        optimizer = kind(self.network.parameters(), lr=settings.max_lr, weight_decay=settings.weight_decay)
+        schedule = torch.optim.lr_scheduler.OneCycleLR(
+            optimizer,
+            settings.max_lr,
+            total_steps=int(self.trainer.estimated_stepping_batches),
+            pct_start=settings.warm_up,
+            div_factor=settings.initial_divisor,
+        )
+        return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
+
+
+def _is_in_range(sample: Sample, network: Network) -> Tensor:
+    return network.grid.in_range(sample.points[: sample.num_current])
