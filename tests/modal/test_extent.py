@@ -45,4 +45,4 @@ def test_track_max_knows_them_all_in_world_directions(table):
 @pytest.mark.parametrize("strategy", [ShrinkWrap, TrackMax])
 def test_a_floor_must_be_positive(strategy):
     with pytest.raises(ConfigError, match=r"extent\.floor: expected a length above 0 m, found 0"):
-        strategy(floor=0)
+        strategy(floor=0.0)

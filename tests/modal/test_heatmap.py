@@ -8,7 +8,10 @@ from most.modal.heatmap import HeatmapTargets, draw_heatmap, gaussian_radius
 
 
 def draw(peaks, variances, shape=(1, 9, 7)):
-    planes, cells = torch.tensor([p[0] for p in peaks]), torch.tensor([p[1:] for p in peaks]).reshape(-1, 2)
+    planes, cells = (
+        torch.tensor([p[0] for p in peaks]),
+        torch.tensor([p[1:] for p in peaks], dtype=torch.int64).reshape(-1, 2),
+    )
     return draw_heatmap(planes.long(), cells, torch.tensor(variances).reshape(-1, 2), shape)
 
 
@@ -71,5 +74,5 @@ def test_gaussian_radius_is_centre_points():
     [("kind", "round"), ("min_variance", 0.0), ("min_overlap", 1.0), ("min_radius", -1), ("min_points", 0)],
 )
 def test_settings_out_of_range_are_refused(key, value):
-    with pytest.raises(ConfigError, match=rf"heatmap\.{key}: expected .*, found {value!r}"):
+    with pytest.raises(ConfigError, match=rf"stage\.targets\.{key}: expected .*, found {value!r}"):
         HeatmapTargets(**{key: value})

@@ -25,7 +25,9 @@ def test_half_sizes_follow_a_turn_exactly():
 
 
 def test_rows_may_come_in_any_order_and_number():
-    outlines = join([np.array([[1.0, 2.0]]), np.array([[3.0, 0.0], [0.0, -4.0]]), np.array([[0.0, 5.0]])], [1, 2, 3])
+    outlines = join(
+        [np.array([[1.0, 2.0]]), np.array([[3.0, 0.0], [0.0, -4.0]]), np.array([[0.0, 5.0]])], [1.0, 2.0, 3.0]
+    )
     assert half_sizes(outlines, [2, 0, 1, 2]).tolist() == [[0, 5, 3], [1, 2, 1], [3, 4, 2], [0, 5, 3]]
     assert outlines.half_sizes(torch.zeros(0, dtype=torch.int64), torch.eye(2, dtype=torch.float64), 1.0).shape == (
         0,

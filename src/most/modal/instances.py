@@ -1,7 +1,7 @@
 """The thing instances of a sequence: one row per instance and frame, and what a window's sample takes from them."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import torch
 from jaxtyping import Bool, Float64, Int64
@@ -12,6 +12,7 @@ from most.modal.outline import Outlines
 from most.structures import Instances
 
 
+@runtime_checkable
 class ExtentStrategy(Protocol):
     """Says how large an instance is."""
 

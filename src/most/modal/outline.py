@@ -58,7 +58,7 @@ def merge(outlines: Outlines, owners: Int64[np.ndarray, "outlines"], num_owners:
     if num_owners == 0:
         return join([], [])
     hulls = [hull(np.concatenate([vertices[starts[i] : starts[i + 1]] for i in group])) for group in groups]
-    return join(hulls, [heights[group].max() for group in groups])
+    return join(hulls, [float(heights[group].max()) for group in groups])
 
 
 def hull(points: Float[np.ndarray, "points 2"]) -> Float[np.ndarray, "vertices 2"]:
