@@ -6,5 +6,5 @@ from pathlib import Path
 from hypothesis import settings
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-settings.register_profile("metrics", deadline=None, max_examples=60)
+settings.register_profile("metrics", deadline=None, max_examples=30)
 settings.load_profile("metrics")

@@ -1,0 +1,106 @@
+"""Scores a folder of predictions in the official layout, ours or anyone's, one scan at a time."""
+
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from jaxtyping import Float, Int64
+from torch import Tensor
+from tqdm import tqdm
+
+from most.errors import DataError
+from most.metrics.assignments import assignments_path, read_assignments
+from most.metrics.membership import MembershipCounts, membership_counts
+from most.metrics.panoptic import PanopticStatistics, panoptic_figures, panoptic_statistics, per_class
+from most.metrics.truth import Frame, Taxonomy, TruthReader, find_instances
+
+
+def evaluate_folder(
+    reader: TruthReader[Frame],
+    frames: Sequence[Frame],
+    folder: Path,
+    read_labels: Callable[[Path], Int64[Tensor, "points"]],
+    progress: bool = True,
+) -> dict[str, Any]:
+    """Score the predictions of ``frames`` in ``folder`` and return the report.
+
+    ``{"scans": ..., "panoptic": {pq, ..., membership_accuracy, membership_accuracy_contested, per_class}}``. The
+    membership accuracies are None unless the folder also holds detections and the dataset its scans. Raises DataError
+    for predictions that are missing or do not fit the truth, and for a split without labels.
+    """
+    paths = _prediction_paths(reader, frames, folder)
+    taxonomy = reader.taxonomy
+    panoptic = PanopticStatistics.zeros(len(taxonomy.class_names))
+    membership = MembershipCounts() if _has_assignments(reader, frames, paths) else None
+    for frame, path in tqdm(
+        zip(frames, paths, strict=True), "evaluate", len(frames), unit="scan", disable=not progress
+    ):
+        truth, prediction = reader.labels(frame), read_labels(path)
+        if len(prediction) != len(truth):
+            raise DataError(
+                f"{path}: expected a label for each of the scan's {len(truth)} points, found {len(prediction)}; "
+                "predict this scan again"
+            )
+        truth_semantics = taxonomy.to_training(truth, "truth of " + str(path))
+        semantics = taxonomy.to_training(prediction, path)
+        panoptic += panoptic_statistics(
+            semantics, prediction, truth_semantics, truth, len(taxonomy.class_names), taxonomy.min_points
+        )
+        if membership is not None:
+            points = reader.sweep(frame).points[:, :3]
+            membership += _memberships(assignments_path(path), points, semantics, truth, truth_semantics, taxonomy)
+    figures: dict[str, Any] = dict(panoptic_figures(panoptic, taxonomy.things))
+    unknown = {"membership_accuracy": None, "membership_accuracy_contested": None}
+    figures |= unknown if membership is None else membership.accuracies()
+    return {"scans": len(frames), "panoptic": figures | {"per_class": per_class(panoptic, taxonomy.class_names)}}
+
+
+def _prediction_paths(reader: TruthReader[Frame], frames: Sequence[Frame], folder: Path) -> list[Path]:
+    """Where the predictions lie; raises DataError unless all are there."""
+    if not frames:
+        raise DataError(f"{folder}: expected scans to score, found none in the split")
+    paths = [reader.prediction_path(folder, frame) for frame in frames]
+    if missing := [path for path in paths if not path.is_file()]:
+        raise DataError(
+            f"{missing[0]}: expected a prediction for each of {len(paths)} scans, found none for {len(missing)}, "
+            "of which this is the first; check the folder and the split, or predict them"
+        )
+    return paths
+
+
+def _has_assignments(reader: TruthReader[Frame], frames: Sequence[Frame], paths: Sequence[Path]) -> bool:
+    """Whether everything is there that the membership accuracy needs; says so where only a part is."""
+    there = sum(assignments_path(path).is_file() for path in paths)
+    if not there:
+        return False
+    if there < len(paths):
+        warnings.warn(f"no membership accuracy: detections of {there} of {len(paths)} scans are there", stacklevel=3)
+        return False
+    try:
+        reader.sweep(frames[0])
+    except DataError as error:
+        warnings.warn(f"no membership accuracy: {error}", stacklevel=3)
+        return False
+    return True
+
+
+def _memberships(
+    path: Path,
+    points: Float[Tensor, "points 3"],
+    semantics: Int64[Tensor, "points"],
+    truth: Int64[Tensor, "points"],
+    truth_semantics: Int64[Tensor, "points"],
+    taxonomy: Taxonomy,
+) -> MembershipCounts:
+    """Score the memberships of one scan, written to ``path``."""
+    found = read_assignments(path)
+    if not len(found.assigned) == len(points) == len(truth):
+        raise DataError(
+            f"{path}: expected as many points as labels ({len(truth)}), found {len(found.assigned)} assigned, and "
+            f"{len(points)} in the scan"
+        )
+    instances = find_instances(points, truth, truth_semantics, taxonomy)
+    return membership_counts(
+        points, semantics, truth_semantics, truth, found.detections, found.roi, found.assigned, instances
+    )

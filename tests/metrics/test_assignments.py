@@ -1,0 +1,78 @@
+"""Detections beside a prediction: what is written is read, and what is no such file is refused."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from most.errors import DataError
+from most.metrics.assignments import Assignments, assignments_path, read_assignments, write_assignments
+from most.structures import Detections
+
+
+def assignments(count: int) -> Assignments:
+    detections = Detections(
+        torch.arange(count), torch.rand(count), torch.rand(count, 3), torch.rand(count, 3), torch.rand(count, 2)
+    )
+    return Assignments(detections, torch.rand(count, 3), torch.tensor([-1, count - 1, -1]))
+
+
+@pytest.mark.parametrize("count", [0, 4])
+def test_what_is_written_is_read(tmp_path: Path, count: int) -> None:
+    written = assignments(count)
+    path = assignments_path(tmp_path / "sequences" / "08" / "predictions" / "000123.label")
+    assert path == tmp_path / "sequences" / "08" / "detections" / "000123.npz"
+    write_assignments(path, written)
+    found = read_assignments(path)
+    for name, value in vars(written.detections).items():
+        assert torch.equal(getattr(found.detections, name), value)
+    assert torch.equal(found.roi, written.roi)
+    assert torch.equal(found.assigned, written.assigned)
+
+
+def without_roi(arrays: dict[str, np.ndarray]) -> None:
+    del arrays["roi"]
+
+
+def with_other_centres(arrays: dict[str, np.ndarray]) -> None:
+    arrays["centres"] = arrays["centres"][:1]
+
+
+def with_unknown_detection(arrays: dict[str, np.ndarray]) -> None:
+    arrays["assigned"] = np.array([0, 2])
+
+
+def with_pickled_objects(arrays: dict[str, np.ndarray]) -> None:
+    arrays["scores"] = np.array([{}, {}], dtype=object)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (without_roi, "found no roi"),
+        (with_other_centres, r"centres: expected shape \(2, 3\), found \(1, 3\)"),
+        (with_unknown_detection, "assigned: expected .* from -1 to 1"),
+        (with_pickled_objects, "allow_pickle"),
+    ],
+)
+def test_other_contents_are_refused(
+    tmp_path: Path, spoil: Callable[[dict[str, np.ndarray]], None], message: str
+) -> None:
+    path = tmp_path / "000000.npz"
+    write_assignments(path, assignments(2))
+    with np.load(path) as file:
+        arrays = dict(file)
+    spoil(arrays)
+    np.savez(path, **arrays)
+    with pytest.raises(DataError, match=rf"000000\.npz: .*{message}"):
+        read_assignments(path)
+
+
+def test_other_files_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "000000.npz"
+    write_assignments(path, assignments(2))
+    path.write_bytes(path.read_bytes()[:200])
+    with pytest.raises(DataError, match=r"000000\.npz: expected an \.npz file"):
+        read_assignments(path)
