@@ -5,7 +5,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from jaxtyping import Float64, Int64
 from torch import Tensor
@@ -29,6 +29,7 @@ class Frame:
         return f"{self.index:06d}"
 
 
+@runtime_checkable
 class Reader(Protocol):
     """Reads one dataset; all errors are DataErrors that name file, expectation, finding and remedy."""
 
