@@ -21,7 +21,7 @@ def kernel_map(sites: Sites, kind: str) -> KernelMap:
     if kind.startswith("strided"):
         return sites.strided(int(kind[-1]))
     if kind.startswith("inverse"):
-        return sites.strided(int(kind[-1])).inverse()
+        return sites.strided(int(kind[-1])).inverse
     return sites.submanifold((int(kind[0]), int(kind[1]), int(kind[2])))
 
 

@@ -3,6 +3,7 @@
 from typing import Any
 
 import torch
+import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor
 from torch.autograd.function import once_differentiable
@@ -32,44 +33,44 @@ class _SparseConv(torch.autograd.Function):
     def forward(ctx: Any, features: Tensor, taps: Tensor, kernel_map: KernelMap) -> Tensor:
         ctx.save_for_backward(features, taps)
         ctx.kernel_map = kernel_map
-        return _convolve(features, taps, kernel_map)
+        products = features.new_empty(len(kernel_map.input_rows), taps.shape[2])
+        inputs = kernel_map.input_rows.split(kernel_map.counts)
+        for tap, rows, product in zip(taps, inputs, products.split(kernel_map.counts), strict=True):
+            torch.mm(features.index_select(0, rows), tap, out=product)
+        out = _sum_by_output(products, kernel_map)
+        return out if kernel_map.centre is None else out.addmm_(features, taps[kernel_map.centre])
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
         features, taps = ctx.saved_tensors
+        kernel_map: KernelMap = ctx.kernel_map
         gradient = gradient.contiguous()
-        by_features = by_taps = None
-        if ctx.needs_input_grad[0]:
-            by_features = _convolve(gradient, taps.transpose(1, 2), ctx.kernel_map.inverse())
-        if ctx.needs_input_grad[1]:
-            by_taps = _correlate(features, gradient, taps, ctx.kernel_map)
+        products = features.new_empty(len(kernel_map.input_rows), taps.shape[1])
+        by_taps = torch.empty_like(taps, memory_format=torch.contiguous_format)
+        for tap, by_tap, input_rows, output_rows, product in zip(
+            taps,
+            by_taps,
+            kernel_map.input_rows.split(kernel_map.counts),
+            kernel_map.output_rows.split(kernel_map.counts),
+            products.split(kernel_map.counts),
+            strict=True,
+        ):
+            gathered = gradient.index_select(0, output_rows)
+            torch.mm(gathered, tap.t(), out=product)
+            torch.mm(features.index_select(0, input_rows).t(), gathered, out=by_tap)
+        by_features = _sum_by_output(products, kernel_map.inverse)
+        if kernel_map.centre is not None:
+            by_features.addmm_(gradient, taps[kernel_map.centre].t())
+            torch.mm(features.t(), gradient, out=by_taps[kernel_map.centre])
         return by_features, by_taps, None
 
 
-def _convolve(features: Tensor, taps: Tensor, kernel_map: KernelMap) -> Tensor:
-    if kernel_map.centre is None:
-        out = features.new_zeros(len(kernel_map.outputs), taps.shape[2])
-    else:
-        out = features @ taps[kernel_map.centre]
-    pairs = zip(_split(kernel_map.input_rows, kernel_map), _split(kernel_map.output_rows, kernel_map), strict=True)
-    for tap, (inputs, outputs) in zip(taps, pairs, strict=True):
-        if len(inputs):
-            out.index_add_(0, outputs, features.index_select(0, inputs) @ tap)
-    return out
-
-
-def _correlate(features: Tensor, gradient: Tensor, taps: Tensor, kernel_map: KernelMap) -> Tensor:
-    """Return the gradient by the taps: for each offset, the inner product of its inputs and its outputs' gradients."""
-    out = torch.zeros_like(taps, memory_format=torch.contiguous_format)
-    pairs = zip(_split(kernel_map.input_rows, kernel_map), _split(kernel_map.output_rows, kernel_map), strict=True)
-    for offset, (inputs, outputs) in enumerate(pairs):
-        if offset == kernel_map.centre:
-            out[offset] = features.t() @ gradient
-        elif len(inputs):
-            out[offset] = features.index_select(0, inputs).t() @ gradient.index_select(0, outputs)
-    return out
-
-
-def _split(rows: Tensor, kernel_map: KernelMap) -> tuple[Tensor, ...]:
-    return rows.split(kernel_map.counts)
+def _sum_by_output(
+    products: Float[Tensor, "pairs channels"], kernel_map: KernelMap
+) -> Float[Tensor, "outputs channels"]:
+    """Add up what the pairs bring to each output row, always in the same order, whatever the number of threads."""
+    order, starts = kernel_map.bags
+    if len(order) == 0:
+        return products.new_zeros(len(kernel_map.outputs), products.shape[1])
+    return F.embedding_bag(order, products, starts, mode="sum")

@@ -76,7 +76,7 @@ class InverseConv(_SparseConvolution):
 
     def forward(self, x: SparseTensor, sites: Sites) -> SparseTensor:
         """Convolve onto ``sites``, whose strided map must lead to the sites of ``x``."""
-        kernel_map = sites.strided(self.kernel).inverse()
+        kernel_map = sites.strided(self.kernel).inverse
         if len(kernel_map.inputs) != len(x.features):
             raise ValueError(f"inverse convolution: expected {len(kernel_map.inputs)} sites, found {len(x.features)}")
         return self._convolve(x.features, kernel_map)

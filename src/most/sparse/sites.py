@@ -82,5 +82,5 @@ class Sites:
 
 
 def _joined(inputs: Sites, outputs: Sites, pairs: list[Pairs], centre: int | None) -> KernelMap:
-    input_rows, output_rows = (torch.cat(rows) for rows in zip(*pairs, strict=True))
+    input_rows, output_rows = (torch.cat(rows).int() for rows in zip(*pairs, strict=True))
     return KernelMap(inputs, outputs, input_rows, output_rows, [len(rows) for rows, _ in pairs], centre)
