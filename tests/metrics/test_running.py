@@ -36,15 +36,11 @@ def test_panoptic_quality_accumulates_and_resets() -> None:
     assert metric.compute() == pytest.approx(panoptic_figures(together(3), THINGS))
 
 
-def test_two_processes_that_saw_half_each_agree_with_one_that_saw_all() -> None:
-    halves = [PanopticQuality(NAMES, THINGS, min_points=10) for _ in range(2)]
-    halves[0].update(*scan(0))
-    halves[1].update(*scan(1))
-    states = [half.metric_state for half in halves]
-    one = PanopticQuality(NAMES, THINGS, min_points=10)
-    for name, reduce in one._reductions.items():
-        setattr(one, name, reduce(torch.stack([state[name] for state in states])))
-    one._update_count = 2
+def test_two_that_saw_half_each_merge_into_one_that_saw_all() -> None:
+    one, other = (PanopticQuality(NAMES, THINGS, min_points=10) for _ in range(2))
+    one.update(*scan(0))
+    other.update(*scan(1))
+    one.merge_state(other)
     assert one.compute() == pytest.approx(panoptic_figures(together(0, 1), THINGS))
 
 

@@ -1,0 +1,49 @@
+"""Score a folder of predictions: ``python -m most.evaluate predictions=FOLDER split=val out=metrics.json``."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import hydra
+from omegaconf import MISSING, DictConfig
+
+from most.config import conf_dir, register, store_root, typed
+from most.datasets.labels import read_labels
+from most.datasets.semantickitti import SemanticKITTI
+from most.entry import run
+from most.metrics.folders import evaluate_folder
+from most.metrics.report import format_table, write_report
+
+
+@dataclass
+class EvaluateConfig:
+    """What ``most.evaluate`` is told."""
+
+    predictions: str = MISSING  # holds sequences/NN/predictions/*.label, ours or anyone's
+    out: str = "metrics.json"
+    split: str = "val"
+    dataset: Any = None
+
+
+register()
+store_root("evaluate", EvaluateConfig)
+
+
+def evaluate(config: EvaluateConfig) -> None:
+    """Write the report to ``out`` and print its table; labels are needed of the dataset, scans are not."""
+    reader = SemanticKITTI(config.dataset.root, config.dataset.splits)
+    frames = reader.labelled_frames(config.split)
+    report = evaluate_folder(reader, frames, Path(config.predictions), read_labels)
+    write_report(Path(config.out), report)
+    taxonomy = reader.taxonomy
+    print(format_table(report["panoptic"], [taxonomy.class_names[thing] for thing in taxonomy.things]))
+
+
+@hydra.main(version_base=None, config_path=str(conf_dir()), config_name="evaluate")
+def main(config: DictConfig) -> None:
+    """Compose, check, score."""
+    run(lambda: evaluate(typed(config)))
+
+
+if __name__ == "__main__":
+    main()
