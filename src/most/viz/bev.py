@@ -55,11 +55,11 @@ def draw_bev(
         places = _draw_labels(axes[0], xyz, truth, taken, style, reach)
         taken = {mine: places[yours] for mine, yours in agreement.partners.items()}
         _draw_errors(axes[2], xyz, agreement, reach)
-        name_panel(axes[0], "truth", f"{len(places)} instances")
+        name_panel(axes[0], "truth", f"instances: {len(places)}")
     middle = axes[len(axes) // 2]
     _draw_labels(middle, xyz, prediction, taken, style, reach)
     _draw_objects(middle, detections, detections.velocities.norm(dim=1) > SLOW, style)
-    name_panel(middle, "prediction", f"{len(detections)} detections")
+    name_panel(middle, "prediction", f"detections: {len(detections)}")
     if truth and instances:
         moving = instances.velocity_known & (instances.velocities.norm(dim=1) > SLOW)
         _draw_objects(axes[0], instances, moving, style)

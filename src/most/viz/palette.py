@@ -57,7 +57,9 @@ def paint(
     painted = muted(colours)[semantics]
     painted[np.isin(semantics, things)] = to_rgb(UNCLAIMED)
     names, owners = np.unique(segments, return_inverse=True)
-    bright_colours = np.array([to_rgb(INSTANCES[places[int(name)]]) if name else (0, 0, 0) for name in names])
+    bright_colours = np.array([to_rgb(INSTANCES[places[int(name)]]) if name else (0, 0, 0) for name in names]).reshape(
+        -1, 3
+    )
     is_instance = segments > 0
     painted[is_instance] = bright_colours[owners[is_instance]]
     return painted
