@@ -52,7 +52,7 @@ def test_translation_has_the_named_deviation() -> None:
 
 
 def test_same_generator_same_transform() -> None:
-    augment = Augment(True, True, 45, [0.9, 1.1], 0.5)
+    augment = Augment(True, True, 45.0, [0.9, 1.1], 0.5)
     one, other = (augment.transform(np.random.default_rng([1, 2, 3])) for _ in range(2))
     assert torch.equal(one.linear, other.linear)
     assert torch.equal(one.translation, other.translation)

@@ -96,7 +96,7 @@ def fit(tree: Path, folder: Path, epochs: int, resume: Path | None = None) -> li
     quiet = {"logger": False, "enable_progress_bar": False, "enable_model_summary": False, "accelerator": "cpu"}
     trainer = L.Trainer(max_epochs=epochs, default_root_dir=folder, enable_checkpointing=False, **quiet)
     recorder = Recorder()
-    trainer.fit(recorder, datamodule=module(tree), ckpt_path=resume)
+    trainer.fit(recorder, datamodule=module(tree, workers=2), ckpt_path=resume)
     trainer.save_checkpoint(folder / f"{epochs}.ckpt")
     return recorder.seen
 

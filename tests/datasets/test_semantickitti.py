@@ -116,6 +116,12 @@ def break_file(tree: Path, name: str, content: bytes | None) -> None:
         ("poses.txt", b"1 0 0 0 0 1 0 0 0 0 1 0\nnot numbers\n", "line 2: .* found 'not numbers'"),
         ("poses.txt", b"\xff\xfe\xfd", "expected text, found bytes"),
         ("poses.txt", b"1 0 0 0 0 1 0 0 0 0 1 0\n", "expected a row for scan 000001, found 1 rows; .*copy"),
+        (
+            "poses.txt",
+            b"1 0 0 0 0 1 0 0 0 0 1 0\n" + b"2 0 0 0 0 1 0 0 0 0 1 0\n" * 2,
+            "found none in row 1 and 1 more",
+        ),
+        ("calib.txt", b"Tr: -1 0 0 0 0 1 0 0 0 0 1 0\n", "Tr: expected rotations .* found none in row 0"),
         ("poses.txt", b"", "expected a row for scan 000001, found 0 rows"),
         ("poses.txt", None, "found no file"),
         ("times.txt", b"0.0\n", "expected a row for scan 000001, found 1 rows"),
