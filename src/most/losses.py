@@ -21,10 +21,10 @@ class LossWeights:
     voxel: float = 1.0
     point: float = 1.0
     heatmap: float = 1.0
-    offset: float = 0.5
-    height: float = 0.5
-    extent: float = 0.5
-    velocity: float = 0.5
+    offset: float = 1.0
+    height: float = 1.0
+    extent: float = 1.0
+    velocity: float = 1.0
     class_balance: float = 0.0  # cross-entropy weights are (class frequency) ** -class_balance
 
     def __post_init__(self) -> None:

@@ -1,7 +1,7 @@
 """Fusion of semantics, detections and memberships into one label a point (paper, inference; Algorithm 1)."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import torch
@@ -19,6 +19,7 @@ MEMBER = 0.5  # a pair belongs together above this confidence (Algorithm 1, line
 UNCLAIMED = ("nearest", "cluster", "zero")
 
 
+@runtime_checkable
 class Membership(Protocol):
     """Whatever rates pairs of points and centres."""
 

@@ -9,13 +9,13 @@ import numpy as np
 import torch
 from tqdm import tqdm
 
-from most.datasets.labels import write_labels
+from most.datasets.labels import read_labels, write_labels
 from most.datasets.reader import Frame, Reader
 from most.datasets.taxonomy import Taxonomy
 from most.errors import DataError
 from most.files import atomic_write
 from most.inference import Prediction, Predictor
-from most.structures import Sample
+from most.structures import Detections, Panoptic, Sample
 
 RECORD = "prediction.json"
 
@@ -56,6 +56,19 @@ def write_predictions(
                 path = reader.prediction_path(out, Frame(sample.sequence, sample.index))
                 write_prediction(prediction.to("cpu"), path, reader.taxonomy)
                 progress.update()
+
+
+def read_prediction(path: Path, taxonomy: Taxonomy) -> Prediction:
+    """Read back what ``write_prediction`` wrote; DataError where it is not there."""
+    raw = read_labels(path)
+    try:
+        with np.load(detections_path(path), allow_pickle=False) as arrays:
+            found = {name: torch.from_numpy(arrays[name]) for name in arrays.files}
+        claimed, roi = found.pop("assigned").long(), found.pop("roi")
+        detections = Detections(**found)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DataError(f"{detections_path(path)}: expected detections written by most.predict ({error})") from error
+    return Prediction(Panoptic(taxonomy.to_training(raw, path), taxonomy.instance_of(raw)), detections, roi, claimed)
 
 
 def write_prediction(prediction: Prediction, path: Path, taxonomy: Taxonomy) -> None:

@@ -7,17 +7,19 @@ dataset's own raw labels, widened to int64: they identify an instance, and metri
 """
 
 from dataclasses import dataclass, fields, replace
-from typing import Self
+from typing import TypeVar
 
 import torch
 from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
+Structure = TypeVar("Structure", bound="OnDevice")
+
 
 class OnDevice:
     """Moves every tensor of a dataclass, nested ones too; Lightning calls ``to`` on whatever has one."""
 
-    def to(self, device: torch.device | str, non_blocking: bool = False) -> Self:
+    def to(self: Structure, device: torch.device | str, non_blocking: bool = False) -> Structure:
         """Return a copy whose tensors lie on ``device``."""
         moved = {
             field.name: value.to(device, non_blocking=non_blocking)

@@ -54,7 +54,7 @@ def build_trainer(config: Config, folder: Path) -> L.Trainer:
         Throughput(),
     ]
     if logger:
-        callbacks += [LearningRateMonitor("step"), BevPictures(config.logger.pictures)]
+        callbacks += [LearningRateMonitor("step"), BevPictures(config.logger.pictures, folder / "pictures")]
     if settings.progress_bar:
         callbacks.append(TQDMProgressBar(leave=True))
     return L.Trainer(

@@ -9,7 +9,7 @@ from torch import Tensor, nn
 
 @dataclass
 class SemanticHead:
-    """Whether a linear layer over [voxel logits, F_point, F_bev] refines the points, or they read their voxel's class."""
+    """Whether a linear layer over [voxel logits, F_point, F_bev] refines the points, or they read their voxel's."""
 
     refine_points: bool = True
 

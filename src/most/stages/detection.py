@@ -1,5 +1,6 @@
 """Stage 1: the detection and segmentation network, trained jointly (paper, implementation details)."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -139,18 +140,22 @@ class DetectionStage(L.LightningModule):
         checkpoint["most"] = self.description
 
     def configure_optimizers(self) -> OptimizerLRSchedulerConfig:
-        """Adam or AdamW under a one-cycle schedule."""
-        settings = self.training_settings
-        kind = torch.optim.AdamW if settings.optimizer == "adamw" else torch.optim.Adam
-        optimizer = kind(self.network.parameters(), lr=settings.max_lr, weight_decay=settings.weight_decay)
-        schedule = torch.optim.lr_scheduler.OneCycleLR(
-            optimizer,
-            settings.max_lr,
-            total_steps=int(self.trainer.estimated_stepping_batches),
-            pct_start=settings.warm_up,
-            div_factor=settings.initial_divisor,
-        )
+        """See :func:`one_cycle`."""
+        steps = int(self.trainer.estimated_stepping_batches)
+        optimizer, schedule = one_cycle(self.network.parameters(), self.training_settings, steps)
         return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
+
+
+def one_cycle(
+    parameters: Iterable[Tensor], settings: DetectionTraining, steps: int
+) -> tuple[torch.optim.Optimizer, torch.optim.lr_scheduler.OneCycleLR]:
+    """Return Adam or AdamW and its one-cycle schedule over ``steps`` (supplement, section II)."""
+    kind = torch.optim.AdamW if settings.optimizer == "adamw" else torch.optim.Adam
+    optimizer = kind(parameters, lr=settings.max_lr, weight_decay=settings.weight_decay)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimizer, settings.max_lr, steps, pct_start=settings.warm_up, div_factor=settings.initial_divisor
+    )
+    return optimizer, schedule
 
 
 def _is_in_range(sample: Sample, network: Network) -> Tensor:

@@ -1,0 +1,47 @@
+# A fresh machine needs Python >= 3.11 and its venv module; every target below sets up what it uses.
+PYTHON ?= python3
+TORCH ?= torch==2.13.0# pinned first: left to pip, torch brings gigabytes of CUDA; for a GPU: make setup TORCH=torch
+VENV ?= .venv
+DEMO ?= demo
+RUN = $(VENV)/bin/python
+READY = $(VENV)/.ready
+
+.PHONY: setup demo test lint bench clean
+
+setup: $(READY)
+
+$(READY): pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(RUN) -m pip install --quiet --upgrade pip
+	$(RUN) -m pip install --quiet "$(TORCH)"
+	$(RUN) -m pip install --quiet --editable '.[dev]'
+	touch $(READY)
+
+# Simulate streets, train on some, label others, score them, draw one.
+demo: setup
+	$(RUN) -m most.simulate simulation=demo out=$(DEMO)/streets
+	$(RUN) -m most.train +experiment=sim_demo dataset.root=$(DEMO)/streets dataset.tables=$(DEMO)/tables \
+	  paths.output=$(DEMO)/outputs hydra.run.dir=$(DEMO)/run
+	$(RUN) -m most.predict checkpoint=$(DEMO)/run/checkpoints/last.ckpt split=test out=$(DEMO)/predictions \
+	  dataset=simulated dataset.root=$(DEMO)/streets
+	$(RUN) -m most.evaluate predictions=$(DEMO)/predictions split=test out=$(DEMO)/metrics.json \
+	  dataset=simulated dataset.root=$(DEMO)/streets
+	$(RUN) -m most.draw predictions=$(DEMO)/predictions sequence="'10'" index=5 out=$(DEMO)/sweep.png \
+	  dataset=simulated dataset.root=$(DEMO)/streets dataset.tables=$(DEMO)/tables
+	@echo "table: above and in $(DEMO)/metrics.json; picture: $(DEMO)/sweep.png"
+
+# Real scans, where there are any: MOST_REAL_DATA=FOLDER make test (FOLDER holds semantickitti/sequences/NN).
+test: setup
+	$(RUN) -m pytest -n 2 --jaxtyping-packages=most,beartype.beartype
+
+lint: setup
+	$(RUN) -m ruff check .
+	$(RUN) -m ruff format --check .
+	$(RUN) -m mypy
+
+bench: setup
+	$(RUN) benchmarks/sparse.py
+	$(RUN) benchmarks/network.py
+
+clean:
+	rm -rf $(VENV) $(DEMO) build dist outputs multirun .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,62 @@
+"""Pictures while training: prediction, truth and errors of the first sweeps of each validation."""
+
+from pathlib import Path
+from typing import Any
+
+import lightning as L
+from lightning.pytorch.callbacks import Callback
+from lightning.pytorch.loggers import WandbLogger
+from matplotlib.figure import Figure
+
+from most.datasets.taxonomy import Taxonomy
+from most.inference import Prediction
+from most.structures import Panoptic, Sample
+from most.viz.bev import draw_bev, save
+
+
+class BevPictures(Callback):
+    """Draws ``number`` sweeps a validation, evenly spread; W&B gets them as images, ``folder`` as PNG files."""
+
+    def __init__(self, number: int, folder: Path) -> None:
+        self.number = number
+        self.folder = folder
+
+    def on_validation_batch_end(
+        self,
+        trainer: L.Trainer,
+        pl_module: Any,
+        outputs: Any,
+        batch: list[Sample],
+        batch_idx: int,
+        dataloader_idx: int = 0,
+    ) -> None:
+        """Draw the batch's first sweep when its turn has come."""
+        batches = int(sum(trainer.num_val_batches))
+        due = {round((turn + 0.5) * batches / self.number - 0.5) for turn in range(self.number)}
+        if batch_idx not in due or not trainer.is_global_zero:
+            return
+        sample, prediction = batch[0].to("cpu"), outputs["predictions"][0].to("cpu")
+        figure = draw_prediction(sample, prediction, pl_module.taxonomy)
+        name = f"{sample.sequence}_{sample.index:06d}"
+        save(figure, self.folder / f"epoch_{trainer.current_epoch:03d}" / f"{name}.png")
+        if isinstance(trainer.logger, WandbLogger):
+            trainer.logger.log_image(f"val/bev_{name}", [figure])
+
+
+def draw_prediction(sample: Sample, prediction: Prediction, taxonomy: Taxonomy) -> Figure:
+    """Draw one sweep's prediction, beside its truth where that is known."""
+    truth = None
+    if sample.semantics is not None and sample.labels is not None:
+        things = taxonomy.is_thing(sample.semantics)
+        truth = Panoptic(sample.semantics, sample.labels.where(things, 0))
+    return draw_bev(
+        sample.points[: sample.num_current],
+        truth,
+        prediction.panoptic,
+        prediction.detections,
+        sample.instances,
+        taxonomy.class_names,
+        taxonomy.colours,
+        taxonomy.things,
+        title=f"sequence {sample.sequence}, sweep {sample.index:06d}",
+    )

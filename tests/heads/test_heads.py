@@ -1,0 +1,28 @@
+import torch
+
+from most.heads import CentreHead, SemanticHead
+
+
+def test_maps_have_a_channel_for_each_thing_and_start_at_a_tenth():
+    maps = CentreHead(channels=8).build(bev_channels=4, num_things=3)(torch.zeros(2, 4, 6, 5))
+    assert maps.heatmap.shape == (2, 3, 6, 5)
+    assert torch.allclose(maps.heatmap.sigmoid(), torch.tensor(0.1), atol=1e-3)
+    assert [maps.offset.shape[1], maps.height.shape[1], maps.extent.shape[1], maps.velocity.shape[1]] == [2, 1, 3, 2]
+
+
+def test_refinement_is_one_linear_layer_over_the_concatenation():
+    torch.manual_seed(0)
+    head = SemanticHead().build(classes=3, voxel_channels=4, point_channels=2, bev_channels=5)
+    voxels, points, bev = torch.randn(6, 4), torch.randn(7, 2), torch.randn(1, 5, 2, 2)
+    point_voxel, point_cell = torch.randint(6, (7,)), torch.randint(4, (7,))
+    voxel_logits, point_logits = head(voxels, points, bev, point_voxel, point_cell)
+    columns = bev[0].flatten(1).T
+    joined = torch.cat([voxel_logits[point_voxel], points, columns[point_cell]], 1)
+    assert torch.allclose(point_logits, head.point(joined), atol=1e-5)
+
+
+def test_without_refinement_points_read_their_voxel():
+    head = SemanticHead(refine_points=False).build(classes=3, voxel_channels=4, point_channels=2, bev_channels=5)
+    index = torch.tensor([1, 1, 0])
+    voxel_logits, point_logits = head(torch.randn(2, 4), torch.randn(3, 2), torch.randn(1, 5, 1, 1), index, index * 0)
+    assert torch.equal(point_logits, voxel_logits[index])
