@@ -8,7 +8,7 @@ unmatched segments count only from ``min_points`` points on. Figures are fractio
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -67,27 +67,21 @@ def panoptic_statistics(
 
     known = truth_sem != 0
     length = length[known]
-    pred_class, pred = _segments(pred_sem[known], pred_key[known], num_classes)
-    truth_class, truth = _segments(truth_sem[known], truth_key[known], num_classes)
-    pairs, pair = renumber(truth * len(pred_class) + pred)
-    pair_truth, pair_pred = np.divmod(pairs, max(len(pred_class), 1))
+    pred = _Segments.find(pred_sem[known], pred_key[known], length, num_classes)
+    truth = _Segments.find(truth_sem[known], truth_key[known], length, num_classes)
+    match_pred, match_truth, iou = _matches(pred, truth, length)
 
-    pred_area, truth_area = _totals(pred, length, len(pred_class)), _totals(truth, length, len(truth_class))
-    overlap = _totals(pair, length, len(pairs))
-    iou = overlap / (truth_area[pair_truth] + pred_area[pair_pred] - overlap)
-    matched = (truth_class[pair_truth] == pred_class[pair_pred]) & (iou > 0.5)
-
-    false = (pred_area >= min_points) & (pred_class != 0)
-    missed = truth_area >= min_points
-    false[pair_pred[matched]] = False
-    missed[pair_truth[matched]] = False
-    match_class = truth_class[pair_truth[matched]]
+    false = (pred.areas >= min_points) & (pred.classes != 0)
+    missed = truth.areas >= min_points
+    false[match_pred] = False
+    missed[match_truth] = False
+    match_class = truth.classes[match_truth]
     return PanopticStatistics(
         confusion=torch.from_numpy(confusion).long().view(num_classes, num_classes),
-        iou_sum=torch.from_numpy(_totals(match_class, iou[matched], num_classes)),
+        iou_sum=torch.from_numpy(_totals(match_class, iou, num_classes)),
         tp=torch.from_numpy(np.bincount(match_class, minlength=num_classes)),
-        fp=torch.from_numpy(np.bincount(pred_class[false], minlength=num_classes)),
-        fn=torch.from_numpy(np.bincount(truth_class[missed], minlength=num_classes)),
+        fp=torch.from_numpy(np.bincount(pred.classes[false], minlength=num_classes)),
+        fn=torch.from_numpy(np.bincount(truth.classes[missed], minlength=num_classes)),
     )
 
 
@@ -102,10 +96,29 @@ def _runs(columns: list[Integers]) -> tuple[list[Integers], Integers]:
     return [column[first] for column in columns], np.diff(first, append=count)
 
 
-def _segments(semantics: Integers, keys: Integers, num_classes: int) -> tuple[Integers, Integers]:
-    """The class of each (class, key) pair that occurs, and the index of each run among these pairs."""
-    codes, segment = renumber(renumber(keys)[1] * num_classes + semantics)
-    return codes % num_classes, segment
+class _Segments(NamedTuple):
+    """The segments of one labelling of a scan: the (class, key) pairs that occur."""
+
+    classes: Integers
+    areas: NDArray[np.float64]  # points
+    of_run: Integers  # each run's segment
+
+    @classmethod
+    def find(cls, semantics: Integers, keys: Integers, length: Integers, num_classes: int) -> "_Segments":
+        """Number the pairs of class and key."""
+        codes, of_run = renumber(renumber(keys)[1] * num_classes + semantics)
+        return cls(codes % num_classes, _totals(of_run, length, len(codes)), of_run)
+
+
+def _matches(pred: _Segments, truth: _Segments, length: Integers) -> tuple[Integers, Integers, NDArray[np.float64]]:
+    """Predicted segment, true segment and IoU of each match; above one half no segment can have two."""
+    count = max(len(pred.classes), 1)
+    pairs, pair = renumber(truth.of_run * count + pred.of_run)
+    pair_truth, pair_pred = np.divmod(pairs, count)
+    overlap = _totals(pair, length, len(pairs))
+    iou = overlap / (truth.areas[pair_truth] + pred.areas[pair_pred] - overlap)
+    matched = (truth.classes[pair_truth] == pred.classes[pair_pred]) & (iou > 0.5)
+    return pair_pred[matched], pair_truth[matched], iou[matched]
 
 
 def _totals(index: Integers, amounts: NDArray[Any], size: int) -> NDArray[np.float64]:
