@@ -7,6 +7,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from most.errors import ConfigError
+from most.normed_linear import NormedLinear
 from most.structures import Voxels
 from most.voxels import Grid
 
@@ -35,10 +36,8 @@ class PointMLP(nn.Module):
     def __init__(self, widths: list[int], grid: Grid) -> None:
         super().__init__()
         self.grid = grid
-        layers: list[nn.Module] = []
-        for fan_in, fan_out in zip([POINT_CHANNELS, *widths[:-1]], widths, strict=True):
-            layers += [nn.Linear(fan_in, fan_out, bias=False), nn.BatchNorm1d(fan_out), nn.ReLU(inplace=True)]
-        self.layers = nn.Sequential(*layers)
+        widths_in = [POINT_CHANNELS, *widths[:-1]]
+        self.layers = nn.Sequential(*(NormedLinear(*width) for width in zip(widths_in, widths, strict=True)))
         self.point_channels = widths[-1]
         self.voxel_channels = widths[-1] + VOXEL_CHANNELS
 

@@ -5,7 +5,6 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
-import numpy as np
 import torch
 from tqdm import tqdm
 
@@ -15,14 +14,10 @@ from most.datasets.taxonomy import Taxonomy
 from most.errors import DataError
 from most.files import atomic_write
 from most.inference import Prediction, Predictor
-from most.structures import Detections, Panoptic, Sample
+from most.metrics.assignments import Assignments, assignments_path, read_assignments, write_assignments
+from most.structures import Panoptic, Sample
 
 RECORD = "prediction.json"
-
-
-def detections_path(prediction: Path) -> Path:
-    """Where the detections of the sweep whose labels are ``prediction`` lie."""
-    return prediction.parent.parent / "detections" / f"{prediction.stem}.npz"
 
 
 def claim_folder(out: Path, checkpoint: Path, split: str) -> None:
@@ -60,22 +55,13 @@ def write_predictions(
 
 def read_prediction(path: Path, taxonomy: Taxonomy) -> Prediction:
     """Read back what ``write_prediction`` wrote; DataError where it is not there."""
-    raw = read_labels(path)
-    try:
-        with np.load(detections_path(path), allow_pickle=False) as arrays:
-            found = {name: torch.from_numpy(arrays[name]) for name in arrays.files}
-        claimed, roi = found.pop("assigned").long(), found.pop("roi")
-        detections = Detections(**found)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise DataError(f"{detections_path(path)}: expected detections written by most.predict ({error})") from error
-    return Prediction(Panoptic(taxonomy.to_training(raw, path), taxonomy.instance_of(raw)), detections, roi, claimed)
+    raw, found = read_labels(path), read_assignments(assignments_path(path))
+    panoptic = Panoptic(taxonomy.to_training(raw, path), taxonomy.instance_of(raw))
+    return Prediction(panoptic, found.detections, found.roi, found.assigned)
 
 
 def write_prediction(prediction: Prediction, path: Path, taxonomy: Taxonomy) -> None:
     """Write one sweep's detections, then its labels: where labels are, all is."""
-    arrays = {name: value.numpy() for name, value in vars(prediction.detections).items()}
-    with atomic_write(detections_path(path)) as file:
-        np.savez_compressed(
-            file, roi=prediction.roi.numpy(), assigned=prediction.claimed.numpy().astype(np.int32), **arrays
-        )
+    found = Assignments(prediction.detections, prediction.roi, prediction.claimed)
+    write_assignments(assignments_path(path), found)
     write_labels(path, taxonomy.encode(prediction.panoptic.semantics, prediction.panoptic.ids))

@@ -1,0 +1,50 @@
+"""Linear layer, batch normalisation and ReLU in one pass over the rows.
+
+The mean and variance of ``x @ W.T`` follow from those of ``x``: with mean m and covariance S of the rows, output j has
+mean ``W_j m`` and variance ``W_j S W_j``. So the normalisation folds into the weights before the product is formed, and
+neither the product nor its normalised copy has to be kept for the backward pass: a quarter of the memory and, on a CPU
+that is short of bandwidth, less time. The statistics cost one product of ``in x in``, so a layer that narrows a lot
+takes the ordinary way.
+"""
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+
+class NormedLinear(nn.Module):
+    """``relu(batch_norm(x @ weight.T))`` for rows of points."""
+
+    def __init__(self, in_channels: int, out_channels: int) -> None:
+        super().__init__()
+        self.linear = nn.Linear(in_channels, out_channels, bias=False)
+        self.norm = nn.BatchNorm1d(out_channels)
+
+    def forward(self, x: Float[Tensor, "rows in_channels"]) -> Float[Tensor, "rows out_channels"]:
+        """Normalise by the batch's statistics in training (of two rows or more), by the running ones else."""
+        if self.training and len(x) > 1:
+            if self.linear.in_features > 2 * self.linear.out_features:
+                return self.norm(self.linear(x)).relu_()
+            mean, variance = self._statistics(x)
+        else:
+            mean, variance = self.norm.running_mean, self.norm.running_var
+        scale = self.norm.weight * torch.rsqrt(variance + self.norm.eps)
+        weight = self.linear.weight * scale[:, None]
+        return F.linear(x, weight, self.norm.bias - scale * mean).relu_()
+
+    def _statistics(
+        self, x: Float[Tensor, "rows in_channels"]
+    ) -> tuple[Float[Tensor, "out_channels"], Float[Tensor, "out_channels"]]:
+        """Return mean and variance of the product, and note them in the running statistics."""
+        rows, weight = len(x), self.linear.weight
+        with torch.autocast(x.device.type, enabled=False):  # squares need the full precision
+            exact = x.to(weight.dtype)
+            mean = exact.mean(0)
+            covariance = exact.T @ exact / rows - mean[:, None] * mean
+            mean, variance = weight @ mean, ((weight @ covariance) * weight).sum(1).clamp(min=0)
+        with torch.no_grad():
+            self.norm.running_mean.lerp_(mean, self.norm.momentum)
+            self.norm.running_var.lerp_(variance * rows / (rows - 1), self.norm.momentum)
+            self.norm.num_batches_tracked += 1
+        return mean, variance
