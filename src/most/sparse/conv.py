@@ -1,4 +1,4 @@
-"""The sparse convolution itself: for each kernel offset gather rows, multiply, add to the output's rows."""
+"""The sparse convolution itself: gather rows offset by offset, multiply, add up by output row."""
 
 from typing import Any
 
@@ -8,6 +8,7 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
+from most.sparse.blocks import Block
 from most.sparse.kernel_map import KernelMap
 
 
@@ -22,8 +23,9 @@ def sparse_conv(
         dtype = torch.get_autocast_dtype(device)
         features, weight = features.to(dtype), weight.to(dtype)
     taps = weight.flatten(1, 3).permute(1, 2, 0)  # offsets, in, out
-    out: Tensor = _SparseConv.apply(features, taps, kernel_map)
-    return out
+    order, rank = kernel_map.inputs.order, kernel_map.outputs.rank
+    out: Tensor = _SparseConv.apply(features if order is None else features[order], taps, kernel_map)
+    return out if rank is None else out[rank]
 
 
 class _SparseConv(torch.autograd.Function):
@@ -33,44 +35,55 @@ class _SparseConv(torch.autograd.Function):
     def forward(ctx: Any, features: Tensor, taps: Tensor, kernel_map: KernelMap) -> Tensor:
         ctx.save_for_backward(features, taps)
         ctx.kernel_map = kernel_map
-        products = features.new_empty(len(kernel_map.input_rows), taps.shape[2])
-        inputs = kernel_map.input_rows.split(kernel_map.counts)
-        for tap, rows, product in zip(taps, inputs, products.split(kernel_map.counts), strict=True):
-            torch.mm(features.index_select(0, rows), tap, out=product)
-        out = _sum_by_output(products, kernel_map)
-        return out if kernel_map.centre is None else out.addmm_(features, taps[kernel_map.centre])
+        return _convolve(features, taps, kernel_map)
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
         features, taps = ctx.saved_tensors
-        kernel_map: KernelMap = ctx.kernel_map
-        gradient = gradient.contiguous()
-        products = features.new_empty(len(kernel_map.input_rows), taps.shape[1])
-        by_taps = torch.empty_like(taps, memory_format=torch.contiguous_format)
-        for tap, by_tap, input_rows, output_rows, product in zip(
-            taps,
-            by_taps,
-            kernel_map.input_rows.split(kernel_map.counts),
-            kernel_map.output_rows.split(kernel_map.counts),
-            products.split(kernel_map.counts),
-            strict=True,
-        ):
-            gathered = gradient.index_select(0, output_rows)
-            torch.mm(gathered, tap.t(), out=product)
-            torch.mm(features.index_select(0, input_rows).t(), gathered, out=by_tap)
-        by_features = _sum_by_output(products, kernel_map.inverse)
-        if kernel_map.centre is not None:
-            by_features.addmm_(gradient, taps[kernel_map.centre].t())
-            torch.mm(features.t(), gradient, out=by_taps[kernel_map.centre])
+        by_taps = torch.zeros_like(taps, memory_format=torch.contiguous_format)
+        by_features = _convolve(
+            gradient.contiguous(), taps.transpose(1, 2), ctx.kernel_map.inverse, correlate=(features, by_taps)
+        )
         return by_features, by_taps, None
 
 
-def _sum_by_output(
-    products: Float[Tensor, "pairs channels"], kernel_map: KernelMap
-) -> Float[Tensor, "outputs channels"]:
-    """Add up what the pairs bring to each output row, always in the same order, whatever the number of threads."""
-    order, starts = kernel_map.bags
-    if len(order) == 0:
-        return products.new_zeros(len(kernel_map.outputs), products.shape[1])
-    return F.embedding_bag(order, products, starts, mode="sum")
+def _convolve(
+    features: Float[Tensor, "inputs in_channels"],
+    taps: Float[Tensor, "offsets in_channels out_channels"],
+    kernel_map: KernelMap,
+    correlate: tuple[Float[Tensor, "outputs out_channels"], Float[Tensor, "offsets out_channels in_channels"]]
+    | None = None,
+) -> Float[Tensor, "outputs out_channels"]:
+    """Convolve block by block: gather and multiply offset by offset, then add up the products of each output row.
+
+    The order of the sum is fixed, whatever the number of threads. In the backward pass the rows that are gathered here
+    are the gradients; ``correlate`` holds the features they meet there, and the sum over all pairs of their products,
+    which is the gradient by the taps, is added to its second tensor on the way.
+    """
+    out = features.new_empty(len(kernel_map.outputs), taps.shape[2])
+    centre = kernel_map.centre
+    for block in kernel_map.blocks:
+        products = features.new_empty(len(block.order), taps.shape[2])
+        end = 0
+        for offset, start, stop in block.slices:
+            begin, end = end, end + stop - start
+            gathered = features.index_select(0, kernel_map.input_rows[start:stop])
+            torch.mm(gathered, taps[offset], out=products[begin:end])
+            if correlate is not None:
+                met = correlate[0].index_select(0, kernel_map.output_rows[start:stop])
+                correlate[1][offset].addmm_(met.t(), gathered)
+        rows = slice(block.first, block.last)
+        if centre is None:
+            out[rows] = _sum_by_row(products, block)
+        else:
+            torch.addmm(_sum_by_row(products, block), features[rows], taps[centre], out=out[rows])
+    if centre is not None and correlate is not None:
+        correlate[1][centre].addmm_(correlate[0].t(), features)
+    return out
+
+
+def _sum_by_row(products: Float[Tensor, "block_pairs channels"], block: Block) -> Float[Tensor, "rows channels"]:
+    if len(products) == 0:
+        return products.new_zeros(block.last - block.first, products.shape[1])
+    return F.embedding_bag(block.order, products, block.starts, mode="sum")

@@ -31,9 +31,11 @@ class Sites:
         self.shape = shape
         self.batch_size = batch_size
         self._keys = keys_of(coordinates, shape)
-        self._order: Tensor | None = None  # rows in the order of the keys, where the rows themselves are not
+        self.order: Tensor | None = None  # rows in the order of the keys; None where they are in it already
+        self.rank: Tensor | None = None  # the place of each row in that order
         if not bool((self._keys[1:] > self._keys[:-1]).all()):
-            self._keys, self._order = self._keys.sort()
+            self._keys, self.order = self._keys.sort()
+            self.rank = self.order.argsort()
             if bool((self._keys[1:] == self._keys[:-1]).any()):
                 raise ValueError("Sites: expected each site once, found some twice")
         self._columns: dict[tuple[int, int], list[Pairs]] = {}
@@ -59,7 +61,7 @@ class Sites:
         if kernel not in self._strided:
             if kernel not in (2, 3):
                 raise ValueError(f"strided kernel: expected a width of 2 or 3, found {kernel}")
-            pairs, keys = coarse_pairs(self.coordinates, self.shape, kernel)
+            pairs, keys = coarse_pairs(coordinates_of(self._keys, self.shape), self.shape, kernel)
             shape = coarse_shape(self.shape)
             coarse = Sites(coordinates_of(keys, shape), shape, self.batch_size)
             self._strided[kernel] = _joined(self, coarse, pairs, None)
@@ -75,9 +77,7 @@ class Sites:
 
     def _column(self, dx: int, dy: int) -> list[Pairs]:
         if (dx, dy) not in self._columns:
-            pairs = column_neighbours(self._keys, self.shape, dx, dy)
-            order = self._order
-            self._columns[dx, dy] = pairs if order is None else [(order[i], order[o]) for i, o in pairs]
+            self._columns[dx, dy] = column_neighbours(self._keys, self.shape, dx, dy)
         return self._columns[dx, dy]
 
 
