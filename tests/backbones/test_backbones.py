@@ -44,3 +44,41 @@ def test_contract(settings: type[UNetSettings], density: float) -> None:
 def test_settings_name_what_is_wrong(wrong: dict, key: str) -> None:
     with pytest.raises(ConfigError, match=f"backbone.{key}: expected"):
         UNetSettings(**wrong)
+
+
+@pytest.mark.parametrize("settings", SETTINGS)
+def test_samples_of_a_batch_do_not_touch(settings: type[UNetSettings]) -> None:
+    """In evaluation, where batch statistics play no part, each sample comes out as it does alone."""
+    backbone = settings(widths=[4, 6, 8, 10], bev_channels=7).build(5, SHAPE).double().eval()
+    both = voxels()
+    features = both.features.double()
+    out = backbone(both.with_features(features))
+    for sample in range(2):
+        mine = both.sites.coordinates[:, 0] == sample
+        coordinates = both.sites.coordinates[mine] * torch.tensor([0, 1, 1, 1])
+        alone = backbone(SparseTensor(features[mine], Sites(coordinates, SHAPE, 1)))
+        torch.testing.assert_close(out.voxels[mine], alone.voxels)
+        torch.testing.assert_close(out.bev[sample], alone.bev[0])
+
+
+@pytest.mark.parametrize("squeeze", [False, True])
+def test_bev_map_is_indexed_by_x_then_y(squeeze: bool) -> None:
+    """One voxel lights up the cell it is in and those that two 3 x 3 convolutions reach, and no other."""
+    shape = (80, 64, 8)
+    settings = UNetSettings(widths=[2, 2, 2, 2], bev_channels=4, bev_squeeze=squeeze, down_kernel=2)
+    backbone = settings.build(3, shape).eval()
+    for parameter in backbone.parameters():
+        parameter.data.abs_()  # no ReLU cuts anything off
+    here = SparseTensor(torch.ones(1, 3), Sites(torch.tensor([[0, 8 * 7 + 3, 8 * 2 + 1, 5]]), shape, 1))
+    nothing = SparseTensor(torch.zeros(0, 3), Sites(torch.zeros(0, 4, dtype=torch.int64), shape, 1))
+    lit = ((backbone(here).bev - backbone(nothing).bev).abs().amax((0, 1)) > 0).nonzero()
+    assert lit.tolist() == [[x, y] for x in range(5, 10) for y in range(5)]
+
+
+def test_evaluation_repeats_itself_and_training_moves_the_statistics() -> None:
+    backbone = UNetSettings(widths=[4, 4, 4, 4], bev_channels=4).build(5, SHAPE)
+    before = backbone.stem.x_first[0].norm.running_mean.clone()
+    backbone(voxels())
+    assert not torch.equal(before, backbone.stem.x_first[0].norm.running_mean)
+    backbone.eval()
+    assert torch.equal(backbone(voxels()).voxels, backbone(voxels()).voxels)

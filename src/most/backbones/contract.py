@@ -13,7 +13,7 @@ class BackboneFeatures:
     """The two outputs of a backbone (paper, figure 2)."""
 
     voxels: Float[Tensor, "voxels channels"]  # one row a voxel of the input, in its order
-    bev: Float[Tensor, "batch channels x y"]  # F^bev: cells of ``bev_stride`` voxels, from the grid's lower corner
+    bev: Float[Tensor, "batch bev_channels x y"]  # F^bev: cells of ``bev_stride`` voxels, from the grid's lower corner
 
 
 class Backbone(nn.Module):

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Int64
 from torch import Tensor
 
 Shape = tuple[int, int, int]
-Pairs = tuple[Int64[Tensor, "pairs"], Int64[Tensor, "pairs"]]  # rows of the input, rows of the output
+Pairs = tuple[Int64[Tensor, "_pairs"], Int64[Tensor, "_pairs"]]  # rows of the input, rows of the output; as many each
 
 
 def keys_of(coordinates: Int64[Tensor, "sites 4"], shape: Shape) -> Int64[Tensor, "sites"]:
