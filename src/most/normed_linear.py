@@ -12,6 +12,8 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+MOMENTUM = 0.1  # of the running statistics
+
 
 class NormedLinear(nn.Module):
     """``relu(batch_norm(x @ weight.T))`` for rows of points."""
@@ -19,7 +21,7 @@ class NormedLinear(nn.Module):
     def __init__(self, in_channels: int, out_channels: int) -> None:
         super().__init__()
         self.linear = nn.Linear(in_channels, out_channels, bias=False)
-        self.norm = nn.BatchNorm1d(out_channels)
+        self.norm = nn.BatchNorm1d(out_channels, momentum=MOMENTUM)
 
     def forward(self, x: Float[Tensor, "rows in_channels"]) -> Float[Tensor, "rows out_channels"]:
         """Normalise by the batch's statistics in training (of two rows or more), by the running ones else."""
@@ -28,7 +30,7 @@ class NormedLinear(nn.Module):
                 return self.norm(self.linear(x)).relu_()
             mean, variance = self._statistics(x)
         else:
-            mean, variance = self.norm.running_mean, self.norm.running_var
+            mean, variance = self._running()
         scale = self.norm.weight * torch.rsqrt(variance + self.norm.eps)
         weight = self.linear.weight * scale[:, None]
         return F.linear(x, weight, self.norm.bias - scale * mean).relu_()
@@ -44,7 +46,12 @@ class NormedLinear(nn.Module):
             covariance = exact.T @ exact / rows - mean[:, None] * mean
             mean, variance = weight @ mean, ((weight @ covariance) * weight).sum(1).clamp(min=0)
         with torch.no_grad():
-            self.norm.running_mean.lerp_(mean, self.norm.momentum)
-            self.norm.running_var.lerp_(variance * rows / (rows - 1), self.norm.momentum)
-            self.norm.num_batches_tracked += 1
+            running_mean, running_variance = self._running()
+            running_mean.lerp_(mean, MOMENTUM)
+            running_variance.lerp_(variance * rows / (rows - 1), MOMENTUM)
+        return mean, variance
+
+    def _running(self) -> tuple[Float[Tensor, "out_channels"], Float[Tensor, "out_channels"]]:
+        mean, variance = self.norm.running_mean, self.norm.running_var
+        assert mean is not None and variance is not None  # the norm was made to keep them
         return mean, variance

@@ -1,0 +1,131 @@
+"""The whole way through the real commands, as a newcomer would type them: simulate, train, predict, evaluate, draw."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+TINY = [
+    "grid.voxel_size=[0.4,0.4,0.4]",
+    "backbone.widths=[4,4,8,8]",
+    "backbone.bev_channels=8",
+    "encoder.widths=[8,4]",
+    "heads.centre.channels=8",
+    "stage.epochs=2",
+    "stage.batch_size=2",
+    "trainer.validate_every=1",
+    "trainer.threads=1",
+    "trainer.log_every=1",
+    "dataset.workers=0",
+]
+SPLITS = ["dataset.splits.train=['00']", "dataset.splits.val=['01']", "dataset.splits.test=['11']"]
+
+
+def most(folder: Path, command: str, *arguments: str) -> subprocess.CompletedProcess:
+    """Run a command in ``folder``, W&B's own files too."""
+    places = {f"WANDB_{name}": str(folder / "wandb") for name in ("DIR", "DATA_DIR", "CACHE_DIR", "CONFIG_DIR")}
+    return subprocess.run(
+        [sys.executable, "-m", f"most.{command}", *arguments],
+        cwd=folder, env=os.environ | places | {"OMP_NUM_THREADS": "1"}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> Path:
+    """A folder in which two sequences were simulated and a tiny network was trained."""
+    folder = tmp_path_factory.mktemp("run")
+    steps = [
+        ("simulate", "simulation=demo", "out=streets", "simulation.sequences=['00','01']", "simulation.scans=3",
+         "simulation.sensor.columns=256"),
+        ("train", "+experiment=sim_demo", "dataset.root=streets", "dataset.tables=tables", "hydra.run.dir=run",
+         *SPLITS, *TINY),
+    ]  # fmt: skip
+    for command, *arguments in steps:
+        done = most(folder, command, *arguments)
+        assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_training_leaves_metrics_checkpoints_and_pictures(run):
+    report = json.loads((run / "run" / "metrics.json").read_text())
+    assert 0 <= report["panoptic"]["pq"] <= 1
+    assert {"car", "road"} <= set(report["panoptic"]["per_class"])
+    assert {path.name for path in (run / "run" / "checkpoints").iterdir()} >= {"last.ckpt", "best.ckpt"}
+    assert list((run / "run" / "pictures").rglob("*.png"))
+
+
+def test_the_offline_wandb_run_holds_losses_metrics_rate_throughput_and_pictures(run):
+    (binary,) = (run / "run" / "wandb").glob("offline-run-*/*.wandb")
+    done = subprocess.run(
+        [sys.executable, "-m", "wandb", "leet", "inspect", "--json", str(binary)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    for key in ("train/loss_heatmap", "train/loss_voxel", "val/pq", "val/miou", "lr-Adam", "scans_per_second", "bev_"):
+        assert key in done.stdout, key
+
+
+def test_predictions_cover_every_point_and_are_scored(run):
+    done = most(run, "predict", "checkpoint=run/checkpoints/last.ckpt", "split=val", "out=predictions",
+                "dataset=simulated", "dataset.root=streets", "dataset.workers=0", *SPLITS)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    written = sorted((run / "predictions" / "sequences" / "01" / "predictions").glob("*.label"))
+    assert len(written) == 3
+    for path in written:
+        labels = np.fromfile(path, "<u4")
+        scan = run / "streets" / "sequences" / "01" / "velodyne" / f"{path.stem}.bin"
+        assert len(labels) == scan.stat().st_size // 16
+        raw, ids = labels & 0xFFFF, labels >> 16
+        assert (raw > 0).all()
+        assert ((ids > 0) == (raw <= 32)).all()  # things have an id, stuff has none
+
+    done = most(run, "evaluate", "predictions=predictions", "split=val", "out=scores.json", "dataset=simulated",
+                "dataset.root=streets", *SPLITS)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    scores = json.loads((run / "scores.json").read_text())["panoptic"]
+    trained = json.loads((run / "run" / "metrics.json").read_text())["panoptic"]
+    for name in ("pq", "sq", "rq", "pq_things", "pq_dagger", "miou", "membership_accuracy"):
+        assert scores[name] == (trained[name] and pytest.approx(trained[name], abs=1e-6)), name
+
+    done = most(run, "draw", "predictions=predictions", "sequence='01'", "index=1", "out=sweep.png",
+                "dataset=simulated", "dataset.root=streets", "dataset.tables=tables", *SPLITS)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert (run / "sweep.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_split_without_labels_is_predicted_too(run):
+    blind = run / "blind" / "sequences" / "11"
+    blind.mkdir(parents=True)
+    for name in ("velodyne", "calib.txt", "poses.txt", "times.txt"):
+        (blind / name).symlink_to(run / "streets" / "sequences" / "01" / name)
+    done = most(run, "predict", "checkpoint=run/checkpoints/last.ckpt", "split=test", "out=blind_predictions",
+                "dataset=simulated", "dataset.root=blind", "dataset.workers=0", *SPLITS)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert len(list((run / "blind_predictions").rglob("*.label"))) == 3
+
+
+def test_prediction_goes_on_where_it_stopped_and_refuses_another_models_folder(run):
+    arguments = ["split=val", "dataset=simulated", "dataset.root=streets", "dataset.workers=0", *SPLITS]
+    assert most(run, "predict", "checkpoint=run/checkpoints/last.ckpt", "out=again", *arguments).returncode == 0
+    labels = sorted((run / "again").rglob("*.label"))
+    kept = labels[0].stat().st_mtime_ns
+    labels[1].unlink()
+    assert most(run, "predict", "checkpoint=run/checkpoints/last.ckpt", "out=again", *arguments).returncode == 0
+    assert labels[1].is_file()
+    assert labels[0].stat().st_mtime_ns == kept
+    other = most(run, "predict", "checkpoint=run/checkpoints/last.ckpt", "out=streets", *arguments)
+    assert other.returncode == 2
+    assert "choose another out" in other.stderr
+
+
+def test_a_missing_dataset_is_one_message_before_any_work(tmp_path):
+    done = most(tmp_path, "train", "+experiment=semkitti_max", "dataset.root=nowhere", "hydra.run.dir=run")
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    for hint in ("nowhere/sequences", "velodyne", "most.simulate"):
+        assert hint in done.stderr
+    assert not (tmp_path / "run" / "checkpoints").exists()
