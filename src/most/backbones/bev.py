@@ -1,8 +1,9 @@
 """From the U-Net's bottleneck to the bird's-eye-view map and back (paper, section III, "detection branch").
 
 The voxels of one column are set side by side in channels ("we flatten voxel features along their height"), then two
-3 x 3 convolutions run over the dense map. Optionally the columns are squeezed by a linear layer first, which is a
-sparse operation: only occupied columns cost anything, and the dense part gets as narrow as its output.
+3 x 3 convolutions run over the map. Few columns are occupied, so the first of them, by far the widest, visits those
+only and spreads each over its 3 x 3 neighbours: the same result as a dense convolution, for a tenth of its cost.
+Optionally a linear layer squeezes the columns beforehand, and the whole branch gets as narrow as its output.
 """
 
 import torch
@@ -10,7 +11,7 @@ from jaxtyping import Float, Int64
 from torch import Tensor, nn
 
 from most.backbones.norm import NormReLU
-from most.sparse import Sites, SparseTensor
+from most.sparse import SparseTensor
 
 
 class BevBranch(nn.Module):
@@ -23,7 +24,7 @@ class BevBranch(nn.Module):
         self.squeeze = nn.Linear(stacked, bev_channels, bias=False) if squeeze else None
         self.squeeze_norm = NormReLU(bev_channels) if squeeze else None
         self.convs = nn.Sequential(
-            nn.Conv2d(bev_channels if squeeze else stacked, bev_channels, 3, padding=1, bias=False),
+            ColumnConv(bev_channels if squeeze else stacked, bev_channels),
             NormReLU(bev_channels),
             nn.Conv2d(bev_channels, bev_channels, 3, padding=1, bias=False),
             NormReLU(bev_channels),
@@ -32,33 +33,46 @@ class BevBranch(nn.Module):
 
     def forward(self, x: SparseTensor) -> tuple[SparseTensor, Float[Tensor, "batch bev x y"]]:
         """Return the voxels with the BEV features of their column added, and the BEV map."""
-        cells, column = torch.unique_consecutive(_cells(x.sites), return_inverse=True)
-        dense = self.convs(self._scatter(self._stack(x, len(cells), column), cells, x.sites))
-        by_cell = dense.permute(0, 2, 3, 1).flatten(0, 2)
-        voxels = x.features + self.back(by_cell[cells])[column]
-        return x.with_features(voxels), dense
+        # The voxels of a column are neighbours in the order of the sites.
+        columns, column = torch.unique_consecutive(x.sites.coordinates[:, :3], return_inverse=True, dim=0)
+        size_x, size_y, _ = x.sites.shape
+        stack = self._stack(x, len(columns), column)
+        spread = self.convs[0](stack, columns, (x.sites.batch_size, size_x, size_y))
+        bev: Tensor = self.convs[1:](spread)
+        batch, cell_x, cell_y = columns.unbind(1)
+        found = self.back(bev.permute(0, 2, 3, 1)[batch, cell_x, cell_y])
+        return x.with_features(x.features + found[column]), bev
 
     def _stack(self, x: SparseTensor, columns: int, column: Int64[Tensor, "voxels"]) -> Float[Tensor, "columns stack"]:
         """Set the voxels of a column side by side, lowest first; empty ones are zero."""
-        stack = x.features.new_zeros(columns * self.height, x.features.shape[1])
-        stack = stack.index_copy(0, column * self.height + x.sites.coordinates[:, 3], x.features).view(
-            columns, self.height * x.features.shape[1]
-        )
+        channels = x.features.shape[1]
+        stack = x.features.new_zeros(columns * self.height, channels)
+        stack = stack.index_copy(0, column * self.height + x.sites.coordinates[:, 3], x.features)
+        stack = stack.view(columns, self.height * channels)
         if self.squeeze is None or self.squeeze_norm is None:
             return stack
         out: Tensor = self.squeeze_norm(self.squeeze(stack))
         return out
 
-    def _scatter(
-        self, stack: Float[Tensor, "columns stack"], cells: Int64[Tensor, "columns"], sites: Sites
-    ) -> Float[Tensor, "batch stack x y"]:
-        """Lay the columns out as a dense map (channels last in memory, which is also what convolutions like)."""
-        size_x, size_y, _ = sites.shape
-        dense = stack.new_zeros(sites.batch_size * size_x * size_y, stack.shape[1]).index_copy(0, cells, stack)
-        return dense.view(sites.batch_size, size_x, size_y, stack.shape[1]).permute(0, 3, 1, 2)
 
+class ColumnConv(nn.Conv2d):
+    """A 3 x 3 convolution of a map that is zero but for some columns; its cost goes with their number."""
 
-def _cells(sites: Sites) -> Int64[Tensor, "voxels"]:
-    """Number the BEV cell of each voxel; voxels of one column are neighbours in the order of the sites."""
-    batch, x, y, _ = sites.coordinates.unbind(1)
-    return (batch * sites.shape[0] + x) * sites.shape[1] + y
+    def __init__(self, in_channels: int, out_channels: int) -> None:
+        super().__init__(in_channels, out_channels, 3, padding=1, bias=False)
+
+    def forward(  # type: ignore[override]
+        self,
+        features: Float[Tensor, "columns in_channels"],
+        columns: Int64[Tensor, "columns 3"],
+        size: tuple[int, int, int],
+    ) -> Float[Tensor, "batch out_channels x y"]:
+        """Convolve columns at (batch, x, y) in a map of ``size`` (batch, x, y)."""
+        batches, size_x, size_y = size[0], size[1] + 2, size[2] + 2  # a spare cell on each side takes what goes over
+        cells = (columns[:, 0] * size_x + columns[:, 1] + 1) * size_y + columns[:, 2] + 1
+        # Tap (i, j) of a convolution reads at (i - 1, j - 1) from its output: the column writes at the opposite.
+        step = torch.tensor([(1 - i) * size_y + 1 - j for i in range(3) for j in range(3)], device=cells.device)
+        products = (features @ self.weight.permute(1, 2, 3, 0).flatten(1)).view(-1, self.out_channels)
+        spread = products.new_zeros(batches * size_x * size_y, self.out_channels)
+        spread = spread.index_add(0, (cells[:, None] + step).flatten(), products)
+        return spread.view(batches, size_x, size_y, self.out_channels)[:, 1:-1, 1:-1].permute(0, 3, 1, 2)
