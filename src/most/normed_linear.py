@@ -53,5 +53,6 @@ class NormedLinear(nn.Module):
 
     def _running(self) -> tuple[Float[Tensor, "out_channels"], Float[Tensor, "out_channels"]]:
         mean, variance = self.norm.running_mean, self.norm.running_var
-        assert mean is not None and variance is not None  # the norm was made to keep them
+        assert mean is not None  # the norm was made to keep both
+        assert variance is not None
         return mean, variance
