@@ -53,7 +53,7 @@ def _loft_faces(rings: int, corners: int) -> Int[np.ndarray, "faces 3"]:
     a, b = ring * corners + corner, ring * corners + (corner + 1) % corners
     sides = np.stack([a, b, b + corners, a, b + corners, a + corners], -1).reshape(-1, 3)
     fan = np.stack([np.zeros(corners - 2, int), np.arange(1, corners - 1), np.arange(2, corners)], 1)
-    return np.concatenate([sides, fan, fan + (rings - 1) * corners])
+    return np.concatenate([sides, fan[:, ::-1], fan + (rings - 1) * corners])
 
 
 def loft(rings: Float[np.ndarray, "rings corners 3"], sides: Surface, caps: Surface | None = None) -> Mesh:
@@ -77,8 +77,11 @@ def tube(start: Vector, end: Vector, radius: float, surface: Surface, sides: int
 
 
 def chain(points: Sequence[Vector], radius: float, surface: Surface, sides: int = 4) -> Mesh:
-    """Round bars from point to point."""
-    return merge([tube(a, b, radius, surface, sides) for a, b in pairwise(points)])
+    """Round bars from point to point, open at their ends, since the next one or something else covers them."""
+    bars = [tube(a, b, radius, surface, sides) for a, b in pairwise(points)]
+    for bar in bars:
+        bar.faces, bar.surfaces = bar.faces[: 2 * sides], bar.surfaces[: 2 * sides]
+    return merge(bars)
 
 
 def box(low: Vector, high: Vector, surface: Surface) -> Mesh:

@@ -43,11 +43,11 @@ def _person(stride: float, phase: float) -> Mesh:
     for side in (-1, 1):
         foot, y = side * swing, side * 0.10
         knee = (0.5 * foot + 0.08 * abs(np.sin(phase)), y, 0.27 * height)
-        parts.append(chain([(0, y, hip), knee, (foot, y, 0.06)], 0.085, Surface.CLOTH, 6))
+        parts.append(chain([(0, y, hip), knee, (foot, y, 0.06)], 0.085, Surface.CLOTH, 5))
         parts.append(tube((foot - 0.08, y, 0.05), (foot + 0.18, y, 0.05), 0.05, Surface.TYRE, 5))
         hand = (-0.7 * side * swing + 0.08, side * 0.30, 0.45 * height)
         elbow = (-0.3 * side * swing - 0.04, side * 0.28, 0.62 * height)
-        parts.append(chain([(0.03, side * 0.22, shoulder - 0.05), elbow, hand], 0.055, Surface.CLOTH, 5))
+        parts.append(chain([(0.03, side * 0.22, shoulder - 0.05), elbow, hand], 0.055, Surface.CLOTH, 4))
     parts.append(ellipsoid((0.05, 0, height - 0.13), (0.11, 0.09, 0.13), Surface.SKIN))
     return merge(parts)
 
@@ -61,10 +61,10 @@ def _torso(low: np.ndarray, high: np.ndarray) -> Mesh:
 
 
 def _wheel(x: float, radius: float, thickness: float) -> Mesh:
-    turn = np.linspace(0, 2 * np.pi, 13)
+    turn = np.linspace(0, 2 * np.pi, 11)
     rim = [(x + radius * np.cos(a), 0.0, radius + thickness + radius * np.sin(a)) for a in turn]
-    spokes = [tube(rim[i], rim[i + 6], 0.45 * thickness, Surface.TUBE, 3) for i in (0, 2, 4)]
-    return merge([chain(rim, thickness, Surface.TYRE), *spokes])
+    spokes = [chain([rim[i], rim[i + 5]], 0.45 * thickness, Surface.TUBE, 3) for i in (0, 2, 4)]
+    return merge([chain(rim, thickness, Surface.TYRE, 3), *spokes])
 
 
 @cache
@@ -74,7 +74,7 @@ def bicycle() -> Mesh:
     rear, front = (-0.53, 0.0, 0.37), (0.55, 0.0, 0.37)
     tubes = [(rear, seat), (rear, crank), (seat, crank), (seat, head), (crank, head), (head, front)]
     parts = [_wheel(-0.53, 0.33, 0.035), _wheel(0.55, 0.33, 0.035)]
-    parts += [tube(a, b, 0.03, Surface.TUBE, 5) for a, b in tubes]
+    parts += [chain(ends, 0.03, Surface.TUBE) for ends in tubes]
     parts.append(chain([(0.42, -0.28, 1.02), (0.36, 0, 1.0), (0.42, 0.28, 1.02)], 0.03, Surface.TUBE))
     parts.append(tube(head, (0.36, 0, 1.0), 0.03, Surface.TUBE, 5))
     parts.append(ellipsoid((-0.24, 0, 0.94), (0.15, 0.08, 0.05), Surface.TYRE, 0))
@@ -116,8 +116,8 @@ def _rider(phase: float, crank: float, hip: np.ndarray, hand: np.ndarray) -> Mes
         angle = phase + (np.pi if side > 0 else 0)
         foot = np.array([-0.03 + crank * np.cos(angle), side * 0.13, 0.36 + crank * np.sin(angle)])
         knee = 0.5 * (hip + foot) + np.array([0.22, side * 0.04, 0.10])
-        parts.append(chain([hip + np.array([0, side * 0.10, 0]), knee, foot], 0.08, Surface.CLOTH, 6))
+        parts.append(chain([hip + np.array([0, side * 0.10, 0]), knee, foot], 0.08, Surface.CLOTH, 5))
         grip, joint = hand * (1, side, 1), shoulder + np.array([0, side * 0.2, -0.03])
         elbow = 0.5 * (shoulder + grip) + np.array([-0.05, side * 0.10, -0.05])
-        parts.append(chain([joint, elbow, grip], 0.055, Surface.CLOTH, 5))
+        parts.append(chain([joint, elbow, grip], 0.055, Surface.CLOTH, 4))
     return merge(parts)

@@ -30,7 +30,7 @@ def populate(street: Street, traffic: TrafficSettings, speed: float, rng: np.ran
 
 def _gain(rng: np.random.Generator) -> float:
     """Brightness of a paint or a cloth relative to the average."""
-    return float(rng.choice([0.15, 0.5, 1.0, 1.5]) * rng.uniform(0.8, 1.2))
+    return float(rng.choice([0.25, 0.6, 1.0, 1.5]) * rng.uniform(0.8, 1.2))
 
 
 def _vehicle(
@@ -52,18 +52,20 @@ def _spread(street: Street, rate: float, rng: np.random.Generator) -> Iterator[f
 
 
 def _parked(street: Street, side: int, traffic: TrafficSettings, rng: np.random.Generator) -> Iterator[Actor]:
-    parking = street.sides[side].parking
+    parking, slant = street.sides[side].parking, street.sides[side].slant
+    trucks = 0.0 if slant else traffic.parked_trucks
     s = street.start + rng.uniform(0, 5)
     while parking and s < street.end:
-        label, make = _vehicle(traffic.parked_trucks, traffic.rare, False, rng)
+        label, make = _vehicle(trucks, traffic.rare and not slant, False, rng)
         mesh = make(rng)
-        length = float(np.ptp(mesh.vertices[:, 0]))
+        size = np.ptp(mesh.vertices, axis=0)
+        length = float((size[1] + 0.6) / np.sin(slant) if slant else size[0])  # taken of the kerb
         middle = s + length / 2
         if rng.random() < traffic.parked and not street.crosses(middle, length / 2 + 4):
             d = side * (street.carriageway + parking / 2 + rng.normal(0, 0.08))
-            facing = (0.0 if side < 0 else np.pi) + rng.normal(0, 0.025)
+            facing = (0.0 if side < 0 else np.pi) + slant + rng.normal(0, 0.025)
             yield Actor(label, Path(middle, d, facing=facing), [mesh], _gain(rng))
-        s += length + 0.35 + rng.exponential(0.6)
+        s += length + 0.35 + rng.exponential(0.5)
 
 
 def _driving(
@@ -102,7 +104,7 @@ def _persons(street: Street, side: int, traffic: TrafficSettings, rng: np.random
     for s in _spread(street, traffic.persons / 1.9, rng):  # 1.9: the mean size of a group
         walks = rng.random() < 0.7
         for k in range(int(rng.choice([1, 1, 2, 2, 3, 4], p=[0.3, 0.15, 0.2, 0.2, 0.1, 0.05]))):
-            d = side * (inner + 0.9 + 0.62 * (k % 2) + rng.normal(0, 0.05))
+            d = side * (inner + 0.9 + 0.72 * (k % 2) + rng.normal(0, 0.05))
             at = s + 0.75 * (k // 2) + rng.normal(0, 0.12)
             height, gain = float(rng.uniform(1.5, 1.92)), _gain(rng)
             if walks:

@@ -38,6 +38,9 @@ def _houses(street: Street, side: int, rare: bool, rng: np.random.Generator) -> 
                 yield _put(street, mesh, middle, side, border + profile.setback + rng.uniform(0, 0.8))
             else:
                 yield from _garden(street, side, middle, length, border, rng)
+            for _ in range(rng.integers(0, 3)):  # tall trees behind
+                at = middle + rng.uniform(-0.5, 0.5) * length
+                yield _put(street, tree(rng).scaled(rng.uniform(1.3, 2.0)), at, side, rng.uniform(border + 14, EDGE))
             if profile.setback > 2.5:
                 yield from _plot(street, side, middle, length, border, rare, rng)
         s += length + rng.choice([0.0, 3.0], p=[0.6, 0.4])
@@ -47,7 +50,7 @@ def _garden(
     street: Street, side: int, s: float, length: float, border: float, rng: np.random.Generator
 ) -> Iterator[Mesh]:
     """Trees and shrubs where no house stands."""
-    for _ in range(int(length / 2)):
+    for _ in range(int(length / 1.6)):
         mesh = tree(rng) if rng.random() < 0.45 else bush(rng)
         d = border + 1.5 + rng.uniform(0, 1) ** 1.5 * (EDGE - border - 8)
         yield _put(street, mesh, s + rng.uniform(-0.5, 0.5) * length, side, d)
@@ -60,7 +63,7 @@ def _plot(
     draw = rng.random()
     if rare and draw < 0.3:
         yield _put(street, fence(0.8 * length, rng.uniform(0.9, 1.7)), s, side, border + 0.2)
-    elif draw < 0.6:
+    elif draw < 0.7:
         yield _put(street, hedge(0.8 * length, rng.uniform(0.8, 1.8), rng), s, side, border + 0.5)
     for _ in range(rng.integers(0, 3)):
         at = s + rng.uniform(-0.4, 0.4) * length
@@ -74,7 +77,7 @@ def _trees(street: Street, side: int, rng: np.random.Generator) -> Iterator[Mesh
     while profile.verge and s < street.end:
         if not street.crosses(s, 5):
             yield _put(street, tree(rng), s, side, street.carriageway + profile.parking + 0.5 * profile.verge)
-        s += rng.uniform(7, 16)
+        s += rng.uniform(6, 13)
 
 
 def _poles(street: Street, side: int, rare: bool, rng: np.random.Generator) -> Iterator[Mesh]:

@@ -9,7 +9,7 @@ from embreex.rtcore_scene import EmbreeScene
 from jaxtyping import Float, UInt32
 
 from most.simulation.mesh import Mesh, merge
-from most.simulation.surfaces import LABELS, REFLECTIVITY, Surface
+from most.simulation.surfaces import GLOSS, LABELS, REFLECTIVITY, Surface
 
 
 @dataclass
@@ -20,6 +20,9 @@ class Hits:
     label: UInt32[np.ndarray, "rays"]  # instance << 16 | raw class
     reflectivity: Float[np.ndarray, "rays"]  # share of the light that comes back at normal incidence
     cosine: Float[np.ndarray, "rays"]  # of the angle of incidence, in [0, 1]
+    gloss: Float[
+        np.ndarray, "rays"
+    ]  # exponent of the cosine in the signal: 0.5 for what is matt, above 1 for what shines
 
     def nearer(self, other: "Hits") -> "Hits":
         """Per ray the nearer of two hits."""
@@ -38,6 +41,7 @@ class Scene:
         dyed = np.isin(whole.surfaces, [Surface.PAINT, Surface.CLOTH, Surface.CARGO, Surface.WALL])
         gain = np.where(dyed, np.repeat(np.asarray(gains, np.float32), sizes), np.float32(1))
         self._reflectivity = REFLECTIVITY[whole.surfaces] * gain
+        self._gloss = GLOSS[whole.surfaces]
         self._embree = EmbreeScene()
         self._mesh = TriangleMesh(self._embree, whole.vertices.astype(np.float32), whole.faces.astype(np.int32))
 
@@ -55,4 +59,5 @@ class Scene:
             np.where(hit, self._labels[face], np.uint32(0)),
             np.where(hit, self._reflectivity[face], np.float32(0)),
             np.where(hit, cosine, np.float32(0)),
+            np.where(hit, self._gloss[face], np.float32(0)),
         )

@@ -52,7 +52,7 @@ def tree(rng: np.random.Generator) -> Mesh:
         way = rng.uniform(-1.3, 1.3, 2)
         centre = np.array([*way, fork + rng.uniform(1.0, 3.2)])
         parts.append(tube((0, 0, fork - 0.1), centre, 0.5 * radius, Surface.BARK, 5, taper=0.3))
-        parts.append(leaves(centre, rng.uniform((1.2, 1.2, 0.9), (2.1, 2.1, 1.6)), 260, 0.20, rng))
+        parts.append(leaves(centre, rng.uniform((1.2, 1.2, 0.9), (2.3, 2.3, 1.8)), 300, 0.28, rng))
     return merge(parts)
 
 
@@ -60,7 +60,7 @@ def bush(rng: np.random.Generator) -> Mesh:
     """A shrub down to the ground."""
     radii = rng.uniform((0.6, 0.6, 0.5), (1.6, 1.2, 1.2))
     core = ellipsoid((0, 0, 0.5 * radii[2]), 0.7 * radii, Surface.LEAF)
-    return merge([core, leaves((0, 0, 0.6 * radii[2]), radii, 180, 0.12, rng)])
+    return merge([core, leaves((0, 0, 0.6 * radii[2]), radii, 220, 0.14, rng)])
 
 
 def hedge(length: float, height: float, rng: np.random.Generator) -> Mesh:

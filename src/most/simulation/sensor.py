@@ -6,7 +6,8 @@ from jaxtyping import Float, UInt32
 from most.simulation.scene import Hits
 from most.simulation.settings import SensorSettings
 
-_HALF_SIGNAL = 0.02  # reflectivity x cosine x (40 m / range)^2 at which 1 - 1/e of the returns are detected
+_FULL = 20.0  # m up to which the optics make up for the distance; the signal falls with its square beyond
+_THRESHOLD = 0.035  # signal of which 1 - 1/e are detected
 
 
 def elevations(sensor: SensorSettings) -> Float[np.ndarray, "beams"]:
@@ -31,11 +32,12 @@ def measure(
     A return is the surer the brighter the surface, the steeper the incidence and the nearer the hit, so that glass,
     dark paint and the road at a grazing angle fade out with range, as they do in real scans.
     """
-    signal = hits.reflectivity * hits.cosine * np.minimum((40.0 / np.maximum(hits.distance, 1.0)) ** 2, 100.0)
-    seen = rng.random(len(rays)) < (1 - sensor.drop_out) * -np.expm1(-signal / _HALF_SIGNAL)
+    signal = hits.reflectivity * hits.cosine**hits.gloss * np.minimum(_FULL / np.maximum(hits.distance, 1.0), 1.0) ** 2
+    seen = rng.random(len(rays)) < (1 - sensor.drop_out) * -np.expm1(-signal / _THRESHOLD)
     seen &= hits.distance < sensor.max_range
     distance = hits.distance[seen] + rng.normal(0, sensor.range_noise, seen.sum())
     brightness = hits.reflectivity[seen] * (0.4 + 0.6 * hits.cosine[seen]) + rng.normal(0, 0.03, seen.sum())
     intensity = np.round(np.clip(brightness, 0, 0.99), 2)
     points = np.concatenate([rays[seen] * distance[:, None], intensity[:, None]], 1)
-    return points.astype(np.float32), hits.label[seen]
+    labelled = np.hypot(points[:, 0], points[:, 1]) < sensor.labelled_range
+    return points.astype(np.float32), np.where(labelled, hits.label[seen], np.uint32(0))

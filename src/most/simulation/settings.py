@@ -21,6 +21,7 @@ class SensorSettings:
     columns: int = 2048  # firings a revolution
     height: float = 1.73  # m above the road
     max_range: float = 80.0  # m
+    labelled_range: float = 50.0  # m on the ground; SemanticKITTI's points beyond are unlabelled
     range_noise: float = 0.02  # m, standard deviation
     drop_out: float = 0.03  # share of the returns that are lost for no visible reason
 
@@ -33,6 +34,7 @@ class SensorSettings:
         _expect("sensor.columns", self.columns >= 8, "at least 8", self.columns)
         _expect("sensor.height", 0.3 <= self.height <= 5, "metres in [0.3, 5]", self.height)
         _expect("sensor.max_range", 10 <= self.max_range <= 200, "metres in [10, 200]", self.max_range)
+        _expect("sensor.labelled_range", self.labelled_range > 0, "metres above 0", self.labelled_range)
         _expect("sensor.range_noise", 0 <= self.range_noise <= 0.2, "metres in [0, 0.2]", self.range_noise)
         _expect("sensor.drop_out", 0 <= self.drop_out < 1, "a share in [0, 1)", self.drop_out)
 
@@ -41,12 +43,12 @@ class SensorSettings:
 class TrafficSettings:
     """How busy the street is: numbers per 100 m of street, both sides together, unless said otherwise."""
 
-    parked: float = 0.55  # share of the kerb's parking space that is taken, where a side has any
+    parked: float = 0.33  # share of the kerb's parking space that is taken, where a side has any
     parked_trucks: float = 0.06  # share of the parked vehicles
-    driving: float = 3.0  # cars and trucks on the move
+    driving: float = 2.5  # cars and trucks on the move
     driving_trucks: float = 0.1  # share of the vehicles on the move
     persons: float = 2.5
-    bicycles: float = 1.0  # parked
+    bicycles: float = 0.7  # parked
     bicyclists: float = 0.5  # riding
     rare: bool = True  # also vans, buses, motorcycles, parking areas, fences, signs and bins
 

@@ -21,6 +21,8 @@ class Side:
     """One side's cross-section from the outer edge of the carriageway outwards, widths in m (0: there is none)."""
 
     parking: float
+    slant: float  # how far parked cars are turned from the street's direction, radians; 0 parks them in a row
+    paved: bool  # the parking space has a surface of its own; else it is the carriageway's
     verge: float  # grass with trees between kerb and sidewalk
     sidewalk: float
     setback: float  # from the sidewalk to the houses
@@ -28,7 +30,11 @@ class Side:
 
     def strips(self, carriageway: float) -> list[tuple[float, Surface]]:
         """(outer border d, surface) of each strip, from the centre line outwards, d > 0."""
-        widths = [(carriageway, Surface.ASPHALT), (self.parking, Surface.PARKING), (self.verge, Surface.GRASS)]
+        widths = [
+            (carriageway, Surface.ASPHALT),
+            (self.parking, Surface.PARKING if self.paved else Surface.ASPHALT),
+            (self.verge, Surface.GRASS),
+        ]
         borders, at = [], 0.0
         for width, surface in [*widths, (self.sidewalk, Surface.PAVING)]:
             at += width
@@ -41,11 +47,11 @@ class Street:
 
     def __init__(self, drive: float, reach: float, rng: np.random.Generator) -> None:
         self.start, self.end = -reach, drive + reach
-        self.lanes = int(rng.choice([1, 1, 1, 2]))  # each way
-        self.lane_width = float(rng.uniform(3.0, 3.6))
-        self.carriageway = self.lanes * self.lane_width + 1.3  # half of it; the rest is where bicycles ride
+        self.lanes = int(rng.choice([1, 1, 1, 1, 2]))  # each way
+        self.lane_width = float(rng.uniform(2.9, 3.4))
+        self.carriageway = self.lanes * self.lane_width + 1.1  # half of it; the rest is where bicycles ride
         self.sides = {side: _draw_side(rng) for side in (-1, 1)}
-        self.built_up = float(rng.uniform(0.45, 0.95))  # share of the street's length that is lined with houses
+        self.built_up = float(rng.uniform(0.35, 0.9))  # share of the street's length that is lined with houses
         self.crossings = _draw_crossings(self.start, self.end, rng)
         self._bends = rng.uniform((0.12, 150, 0), (0.42, 260, 2 * np.pi), (2, 3)) * (rng.choice([-1, 1]), 1, 1)
         self._hills = rng.uniform((0.1, 90, 0, 0), (0.45, 200, 2 * np.pi, 2 * np.pi), (3, 4))
@@ -92,11 +98,15 @@ class Street:
 
 
 def _draw_side(rng: np.random.Generator) -> Side:
+    draw = rng.random()
+    slanted, parking = draw < 0.15, draw < 0.7
     return Side(
-        parking=float(rng.uniform(2.1, 2.5)) if rng.random() < 0.8 else 0.0,
-        verge=float(rng.uniform(1.2, 2.5)) if rng.random() < 0.5 else 0.0,
-        sidewalk=float(rng.uniform(2.4, 4.2)),
-        setback=float(rng.uniform(0.8, 12.0)),
+        parking=float(rng.uniform(4.6, 5.0) if slanted else rng.uniform(2.1, 2.5)) * parking,
+        slant=float(rng.uniform(0.9, np.pi / 2)) * slanted,
+        paved=bool(rng.random() < 0.35),
+        verge=float(rng.uniform(1.2, 2.5)) if rng.random() < 0.6 else 0.0,
+        sidewalk=float(rng.uniform(2.5, 4.8)),
+        setback=float(rng.uniform(0.6, 8.0)),
         slope=float(rng.uniform(-0.02, 0.06)),
     )
 

@@ -38,7 +38,7 @@ _TABLE = {  # raw label (0: the instance's), share of the light that comes back 
     Surface.PAVING: (48, 0.36),
     Surface.GRASS: (72, 0.48),
     Surface.WALL: (50, 0.36),
-    Surface.WINDOW: (50, 0.05),
+    Surface.WINDOW: (50, 0.02),
     Surface.ROOF: (50, 0.30),
     Surface.FENCE: (51, 0.42),
     Surface.LEAF: (70, 0.42),
@@ -46,8 +46,8 @@ _TABLE = {  # raw label (0: the instance's), share of the light that comes back 
     Surface.POLE: (80, 0.50),
     Surface.SIGN: (81, 0.95),
     Surface.BIN: (99, 0.40),
-    Surface.PAINT: (0, 0.40),
-    Surface.GLASS: (0, 0.03),
+    Surface.PAINT: (0, 0.46),
+    Surface.GLASS: (0, 0.01),
     Surface.TYRE: (0, 0.08),
     Surface.CARGO: (0, 0.55),
     Surface.CLOTH: (0, 0.35),
@@ -55,4 +55,6 @@ _TABLE = {  # raw label (0: the instance's), share of the light that comes back 
     Surface.TUBE: (0, 0.45),
 }
 LABELS = np.array([_TABLE[surface][0] for surface in Surface], np.uint32)
+_GLOSSY = (Surface.PAINT, Surface.GLASS, Surface.WINDOW)
+GLOSS = np.array([1.2 if surface in _GLOSSY else 0.5 for surface in Surface], np.float32)  # exponent of the cosine
 REFLECTIVITY = np.array([_TABLE[surface][1] for surface in Surface], np.float32)
