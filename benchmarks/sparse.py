@@ -82,7 +82,7 @@ def occupied(points: Tensor) -> Tensor:
 
 
 def plain_pairs(kernel_map: KernelMap, rows: int) -> list[tuple[Tensor, Tensor]]:
-    inputs, outputs = (list(r.long().split(kernel_map.counts)) for r in (kernel_map.input_rows, kernel_map.output_rows))
+    inputs, outputs = ([r.long() for r in rows] for rows in (kernel_map.input_rows, kernel_map.output_rows))
     inputs[kernel_map.centre] = outputs[kernel_map.centre] = torch.arange(rows)
     return list(zip(inputs, outputs, strict=True))
 

@@ -15,8 +15,8 @@ def test_neighbours_along_a_line() -> None:
     maps = sites.submanifold((1, 1, 3))
     assert maps.counts == [2, 0, 2]
     assert maps.centre == 1
-    assert maps.input_rows.tolist() == [0, 1, 1, 2]
-    assert maps.output_rows.tolist() == [1, 2, 0, 1]
+    assert [rows.tolist() for rows in maps.input_rows] == [[0, 1], [], [1, 2]]
+    assert [rows.tolist() for rows in maps.output_rows] == [[1, 2], [], [0, 1]]
 
 
 def test_the_end_of_an_axis_is_no_neighbour_of_the_next_row() -> None:

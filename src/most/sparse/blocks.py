@@ -4,7 +4,8 @@ That also bounds what a convolution needs beside its inputs and outputs, however
 keeps the allocator from going to the system for every large array, which costs more than the arithmetic does.
 """
 
-from dataclasses import dataclass
+import itertools
+from dataclasses import dataclass, replace
 
 import torch
 from jaxtyping import Int32
@@ -15,36 +16,46 @@ PAIRS_PER_BLOCK_GPU = 1 << 24  # few kernels, each of them large
 
 
 @dataclass
+class Tap:
+    """The pairs of one kernel offset in one block."""
+
+    offset: int
+    input_rows: Int32[Tensor, "tap_pairs"]
+    output_rows: Int32[Tensor, "tap_pairs"]
+
+
+@dataclass
 class Block:
     """A range of output rows and the pairs that end there.
 
-    Their products lie in a buffer, offset after offset; ``order`` puts them in the order of the output rows.
+    The pairs' products lie in a buffer, tap after tap; ``order`` puts them in the order of the output rows.
     """
 
     first: int
     last: int  # one past the end
-    slices: list[tuple[int, int, int]]  # offset, and the range of its pairs; only offsets that have any
+    taps: list[Tap]  # only those that have any pairs
     order: Int32[Tensor, "block_pairs"]
     starts: Int32[Tensor, "rows"]  # where the products of each row begin in ``order``
 
 
-def blocks_of(output_rows: Int32[Tensor, "pairs"], counts: list[int], outputs: int) -> list[Block]:
-    """Cut a kernel map's pairs, grouped by offset and ascending in each, into blocks of as many rows each."""
-    device = output_rows.device
-    most = PAIRS_PER_BLOCK if device.type == "cpu" else PAIRS_PER_BLOCK_GPU
-    parts = max(1, -(-len(output_rows) // most))
+def blocks_of(input_rows: list[Tensor], output_rows: list[Tensor], outputs: int) -> list[Block]:
+    """Cut the pairs, listed by offset and ascending in each list, into blocks of as many output rows each."""
+    device = output_rows[0].device
+    pairs = sum(len(rows) for rows in output_rows)
+    parts = max(1, -(-pairs // (PAIRS_PER_BLOCK if device.type == "cpu" else PAIRS_PER_BLOCK_GPU)))
     bounds = [outputs * part // parts for part in range(parts + 1)]
-    cuts = _cuts(output_rows, counts, bounds, outputs)  # offsets, bounds
-    place = _places(cuts, len(output_rows))
-    order, starts = _by_row(output_rows, counts, outputs, place)
-    edges = starts[torch.tensor(bounds, device=device)].tolist()
-    limits = cuts.tolist()
+    limits = torch.tensor(bounds, dtype=torch.int32, device=device)
+    cuts = torch.stack([torch.searchsorted(rows, limits) for rows in output_rows]).tolist()
+    order, starts = _by_row(output_rows, outputs, cuts)
+    edges = starts[limits].tolist()
     return [
         Block(
             first=bounds[part],
             last=bounds[part + 1],
-            slices=[
-                (k, limit[part], limit[part + 1]) for k, limit in enumerate(limits) if limit[part] < limit[part + 1]
+            taps=[
+                Tap(offset, input_rows[offset][cut[part] : cut[part + 1]], rows[cut[part] : cut[part + 1]])
+                for offset, (rows, cut) in enumerate(zip(output_rows, cuts, strict=True))
+                if cut[part] < cut[part + 1]
             ],
             order=order[edges[part] : edges[part + 1]],
             starts=starts[bounds[part] : bounds[part + 1]] - edges[part],
@@ -53,33 +64,33 @@ def blocks_of(output_rows: Int32[Tensor, "pairs"], counts: list[int], outputs: i
     ]
 
 
-def _cuts(output_rows: Tensor, counts: list[int], bounds: list[int], outputs: int) -> Tensor:
-    """Return where, in the list of all pairs, each block begins within each offset: [offsets, bounds]."""
-    device = output_rows.device
-    offset = torch.arange(len(counts), device=device) * (outputs + 1)
-    ascending = output_rows + offset.repeat_interleave(torch.tensor(counts, device=device))
-    return torch.searchsorted(ascending, offset[:, None] + torch.tensor(bounds, device=device))
+def mirrored(blocks: list[Block], offsets: int) -> list[Block]:
+    """Return the blocks of the opposite map of a submanifold one: the pairs of each offset are its opposite's."""
+    return [
+        replace(block, taps=[replace(tap, offset=offsets - 1 - tap.offset) for tap in block.taps]) for block in blocks
+    ]
 
 
-def _places(cuts: Tensor, pairs: int) -> Int32[Tensor, "pairs"]:
-    """Return the place of each pair's product in the buffer of its block."""
-    sizes = cuts.diff(dim=1)  # offsets, blocks
-    shift = sizes.cumsum(0) - sizes - cuts[:, :-1]
-    place = torch.arange(pairs, device=cuts.device) + shift.flatten().repeat_interleave(sizes.flatten())
-    return place.int()
-
-
-def _by_row(output_rows: Tensor, counts: list[int], outputs: int, place: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the places in the order of the output rows, and where each row begins (one more than there are rows).
+def _by_row(
+    output_rows: list[Tensor], outputs: int, cuts: list[list[int]]
+) -> tuple[Int32[Tensor, "pairs"], Int32[Tensor, "bounds"]]:
+    """Return the places of all products in their block's buffer, by output row, and where each row begins.
 
     Counting beats sorting: each offset fills the next free slot of each of its rows.
     """
-    starts = output_rows.new_zeros(outputs + 1)
-    starts[1:] = torch.bincount(output_rows, minlength=outputs).cumsum(0)
+    every = torch.cat(output_rows)
+    starts = torch.zeros(outputs + 1, dtype=torch.int64, device=every.device)
+    starts[1:] = torch.bincount(every, minlength=outputs).cumsum(0)
     free = starts.clone()
-    order = torch.empty_like(place)
-    for rows, places in zip(output_rows.split(counts), place.split(counts), strict=True):
-        slot = free.index_select(0, rows)
-        order[slot] = places
-        free[rows] = slot + 1
-    return order, starts
+    order = torch.empty_like(every)
+    filled = [0] * (len(cuts[0]) - 1)  # of each block's buffer
+    for rows, cut in zip(output_rows, cuts, strict=True):
+        place = torch.empty_like(rows)
+        for part, (start, stop) in enumerate(itertools.pairwise(cut)):
+            torch.arange(filled[part], filled[part] + stop - start, out=place[start:stop])
+            filled[part] += stop - start
+        row = rows.long()
+        slot = free[row]
+        order[slot] = place
+        free[row] = slot + 1
+    return order, starts.int()

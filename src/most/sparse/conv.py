@@ -22,9 +22,9 @@ def sparse_conv(
     if torch.is_autocast_enabled(device) and features.dtype != torch.float64:
         dtype = torch.get_autocast_dtype(device)
         features, weight = features.to(dtype), weight.to(dtype)
-    taps = weight.flatten(1, 3).permute(1, 2, 0)  # offsets, in, out
+    by_offset = weight.flatten(1, 3).permute(1, 2, 0)  # offsets, in, out
     order, rank = kernel_map.inputs.order, kernel_map.outputs.rank
-    out: Tensor = _SparseConv.apply(features if order is None else features[order], taps, kernel_map)
+    out: Tensor = _SparseConv.apply(features if order is None else features[order], by_offset, kernel_map)
     return out if rank is None else out[rank]
 
 
@@ -32,25 +32,25 @@ class _SparseConv(torch.autograd.Function):
     """Saves its inputs only: what it gathers is gathered again in the backward pass, cheaper than keeping it."""
 
     @staticmethod
-    def forward(ctx: Any, features: Tensor, taps: Tensor, kernel_map: KernelMap) -> Tensor:
-        ctx.save_for_backward(features, taps)
+    def forward(ctx: Any, features: Tensor, weights: Tensor, kernel_map: KernelMap) -> Tensor:
+        ctx.save_for_backward(features, weights)
         ctx.kernel_map = kernel_map
-        return _convolve(features, taps, kernel_map)
+        return _convolve(features, weights, kernel_map)
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
-        features, taps = ctx.saved_tensors
-        by_taps = torch.zeros_like(taps, memory_format=torch.contiguous_format)
+        features, weights = ctx.saved_tensors
+        by_weights = torch.zeros_like(weights, memory_format=torch.contiguous_format)
         by_features = _convolve(
-            gradient.contiguous(), taps.transpose(1, 2), ctx.kernel_map.inverse, correlate=(features, by_taps)
+            gradient.contiguous(), weights.transpose(1, 2), ctx.kernel_map.inverse, correlate=(features, by_weights)
         )
-        return by_features, by_taps, None
+        return by_features, by_weights, None
 
 
 def _convolve(
     features: Float[Tensor, "inputs in_channels"],
-    taps: Float[Tensor, "offsets in_channels out_channels"],
+    weights: Float[Tensor, "offsets in_channels out_channels"],
     kernel_map: KernelMap,
     correlate: tuple[Float[Tensor, "outputs out_channels"], Float[Tensor, "offsets out_channels in_channels"]]
     | None = None,
@@ -59,25 +59,25 @@ def _convolve(
 
     The order of the sum is fixed, whatever the number of threads. In the backward pass the rows that are gathered here
     are the gradients; ``correlate`` holds the features they meet there, and the sum over all pairs of their products,
-    which is the gradient by the taps, is added to its second tensor on the way.
+    which is the gradient by the weights, is added to its second tensor on the way.
     """
-    out = features.new_empty(len(kernel_map.outputs), taps.shape[2])
+    out = features.new_empty(len(kernel_map.outputs), weights.shape[2])
     centre = kernel_map.centre
     for block in kernel_map.blocks:
-        products = features.new_empty(len(block.order), taps.shape[2])
+        products = features.new_empty(len(block.order), weights.shape[2])
         end = 0
-        for offset, start, stop in block.slices:
-            begin, end = end, end + stop - start
-            gathered = features.index_select(0, kernel_map.input_rows[start:stop])
-            torch.mm(gathered, taps[offset], out=products[begin:end])
+        for tap in block.taps:
+            begin, end = end, end + len(tap.input_rows)
+            gathered = features.index_select(0, tap.input_rows)
+            torch.mm(gathered, weights[tap.offset], out=products[begin:end])
             if correlate is not None:
-                met = correlate[0].index_select(0, kernel_map.output_rows[start:stop])
-                correlate[1][offset].addmm_(met.t(), gathered)
+                met = correlate[0].index_select(0, tap.output_rows)
+                correlate[1][tap.offset].addmm_(met.t(), gathered)
         rows = slice(block.first, block.last)
         if centre is None:
             out[rows] = _sum_by_row(products, block)
         else:
-            torch.addmm(_sum_by_row(products, block), features[rows], taps[centre], out=out[rows])
+            torch.addmm(_sum_by_row(products, block), features[rows], weights[centre], out=out[rows])
     if centre is not None and correlate is not None:
         correlate[1][centre].addmm_(correlate[0].t(), features)
     return out

@@ -15,6 +15,7 @@ from most.sparse.neighbours import (
     column_neighbours,
     coordinates_of,
     keys_of,
+    lower_neighbours,
 )
 
 
@@ -71,16 +72,18 @@ class Sites:
         """Look up one half of the offsets: the other half is the same pairs the other way round."""
         offsets = list(itertools.product(*(range(-(width // 2), width // 2 + 1) for width in kernel)))
         centre = len(offsets) // 2
-        half = [self._column(dx, dy)[dz + 1] for dx, dy, dz in offsets[:centre]]
-        nothing = self.coordinates.new_empty(0)
+        half = [self._pairs(*offset) for offset in offsets[:centre]]
+        nothing = self.coordinates.new_empty(0, dtype=torch.int32)
         return _joined(self, self, [*half, (nothing, nothing), *((o, i) for i, o in reversed(half))], centre)
 
-    def _column(self, dx: int, dy: int) -> list[Pairs]:
+    def _pairs(self, dx: int, dy: int, dz: int) -> Pairs:
+        """Return the pairs of one offset; those of a whole column are looked up together."""
         if (dx, dy) not in self._columns:
-            self._columns[dx, dy] = column_neighbours(self._keys, self.shape, dx, dy)
-        return self._columns[dx, dy]
+            beside = (dx, dy) != (0, 0)
+            found = column_neighbours(self._keys, self.shape, dx, dy) if beside else [lower_neighbours(self._keys)]
+            self._columns[dx, dy] = [(inputs.int(), outputs.int()) for inputs, outputs in found]
+        return self._columns[dx, dy][dz + 1]
 
 
 def _joined(inputs: Sites, outputs: Sites, pairs: list[Pairs], centre: int | None) -> KernelMap:
-    input_rows, output_rows = (torch.cat(rows).int() for rows in zip(*pairs, strict=True))
-    return KernelMap(inputs, outputs, input_rows, output_rows, [len(rows) for rows, _ in pairs], centre)
+    return KernelMap(inputs, outputs, [i.int() for i, _ in pairs], [o.int() for _, o in pairs], centre)
