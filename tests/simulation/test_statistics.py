@@ -11,7 +11,7 @@ from most.simulation import SensorSettings, SimulationSettings
 from most.simulation.world import World
 
 REAL = os.environ.get("MOST_REAL_DATA")
-WORLDS = 36  # one scan of each: streets differ, the scans of one street hardly do
+SEEDS, SEQUENCES = 3, 20  # one scan of each street: streets differ, the scans of one street hardly do
 
 
 def _real_scans():
@@ -22,9 +22,10 @@ def _real_scans():
 
 def _simulated_scans():
     sensor = SensorSettings(max_range=52.0)  # labels end at 50 m
-    for sequence in range(WORLDS):
-        scan = World(SimulationSettings(scans=1, sensor=sensor), f"{sequence:02d}").scan(0)
-        yield scan.points, scan.labels
+    for seed in range(SEEDS):
+        for sequence in range(SEQUENCES):
+            scan = World(SimulationSettings(scans=1, seed=seed, sensor=sensor), f"{sequence:02d}").scan(0)
+            yield scan.points, scan.labels
 
 
 def test_contested_and_counted_by_hand():

@@ -38,21 +38,17 @@ def _net(rows: int, columns: int) -> Int[np.ndarray, "faces 3"]:
 
 def _rows(street: Street) -> tuple[Float[np.ndarray, "rows"], Bool[np.ndarray, "rows"]]:
     """Each row's s and whether it lies in a crossing; a crossing's border is there twice, as one and the other."""
-    rows = [(float(s), False) for s in np.arange(street.start, street.end + _CELL, _CELL) if not street.crosses(s, 0.1)]
+    parts, at = [], street.start
     for middle, half in street.crossings:
-        low, high = middle - half, middle + half
-        rows += [(low, False), (low, True), (high, True), (high, False)]
-        rows += [(float(s), True) for s in np.linspace(low, high, 6)[1:-1]]
-    middles = {low: low for low, _ in street.crossings}
-    rows.sort(key=lambda row: (row[0], _inwards(row, list(middles))))
-    return np.array([s for s, _ in rows]), np.array([inside for _, inside in rows])
+        parts += [(_spaced(at, middle - half), False), (_spaced(middle - half, middle + half), True)]
+        at = middle + half
+    parts.append((_spaced(at, max(street.end, at + _CELL)), False))
+    return np.concatenate([s for s, _ in parts]), np.concatenate([np.full(len(s), inside) for s, inside in parts])
 
 
-def _inwards(row: tuple[float, bool], middles: list[float]) -> bool:
-    """Order of the two rows at one border: the outer first where a crossing begins, last where it ends."""
-    s, inside = row
-    begins = any(middle > s for middle in middles if abs(middle - s) < 6)
-    return inside if begins else not inside
+def _spaced(low: float, high: float) -> Float[np.ndarray, "places"]:
+    """Places at most a cell apart, both ends included."""
+    return np.linspace(low, high, max(2, int((high - low) / _CELL) + 2))
 
 
 def _columns(street: Street) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -67,7 +63,7 @@ def _half(side: Side, carriageway: float) -> tuple[np.ndarray, np.ndarray, np.nd
     """One side's columns from the centre line outwards: d, rise, and the surfaces of the cells between them."""
     d, rise, cells, inner = [], [], [], _MARKING
     for outer, surface in side.strips(carriageway):
-        at = np.linspace(inner, outer, max(2, int((outer - inner) / _CELL) + 1))
+        at = _spaced(inner, outer)
         low = surface in (Surface.ASPHALT, Surface.PARKING)
         beyond = at - carriageway - side.parking - side.verge - side.sidewalk
         up = np.zeros_like(at) if low else CURB + side.slope * np.maximum(0.0, beyond)
