@@ -40,7 +40,7 @@ def build_trainer(config: Config, folder: Path) -> L.Trainer:
         devices=settings.devices,
         num_nodes=settings.nodes,
         strategy=settings.strategy,
-        precision=settings.lightning_precision(),
+        precision=settings.precision,
         max_epochs=config.stage.epochs,
         accumulate_grad_batches=settings.accumulated(config.stage.batch_size, config.dataset.batch_size),
         gradient_clip_val=config.stage.clip,

@@ -41,11 +41,12 @@ class _SparseConv(torch.autograd.Function):
     @once_differentiable
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
         features, weights = ctx.saved_tensors
-        by_weights = torch.zeros_like(weights, memory_format=torch.contiguous_format)
+        exact = torch.float32 if weights.dtype in (torch.bfloat16, torch.float16) else weights.dtype
+        by_weights = torch.zeros(weights.shape, device=weights.device, dtype=exact)  # a sum over many blocks
         by_features = _convolve(
             gradient.contiguous(), weights.transpose(1, 2), ctx.kernel_map.inverse, correlate=(features, by_weights)
         )
-        return by_features, by_weights, None
+        return by_features, by_weights.to(weights.dtype), None
 
 
 def _convolve(
@@ -72,14 +73,14 @@ def _convolve(
             torch.mm(gathered, weights[tap.offset], out=products[begin:end])
             if correlate is not None:
                 met = correlate[0].index_select(0, tap.output_rows)
-                correlate[1][tap.offset].addmm_(met.t(), gathered)
+                correlate[1][tap.offset] += met.t() @ gathered
         rows = slice(block.first, block.last)
         if centre is None:
             out[rows] = _sum_by_row(products, block)
         else:
             torch.addmm(_sum_by_row(products, block), features[rows], weights[centre], out=out[rows])
     if centre is not None and correlate is not None:
-        correlate[1][centre].addmm_(correlate[0].t(), features)
+        correlate[1][centre] += correlate[0].t() @ features
     return out
 
 

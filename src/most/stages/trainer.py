@@ -1,9 +1,6 @@
 """Settings of Lightning's Trainer, and what follows from them."""
 
 from dataclasses import dataclass
-from typing import Any
-
-import torch
 
 from most.errors import ConfigError
 
@@ -16,7 +13,7 @@ class TrainerSettings:
     devices: int = 1
     nodes: int = 1
     strategy: str = "auto"
-    precision: str = "32-true"  # as Lightning names it; auto: bf16-mixed on a CPU that computes in it, else 32-true
+    precision: str = "32-true"  # as Lightning names it
     threads: int = 0  # CPU threads of tensor operations; 0 leaves torch's choice
     validate_every: int = 1  # epochs
     log_every: int = 10  # optimiser steps
@@ -26,13 +23,6 @@ class TrainerSettings:
         for key, lowest in {"devices": 1, "nodes": 1, "threads": 0, "validate_every": 1, "log_every": 1}.items():
             if getattr(self, key) < lowest:
                 raise ConfigError(f"trainer.{key}: expected at least {lowest}, found {getattr(self, key)}")
-
-    def lightning_precision(self) -> Any:
-        """Return what Lightning's trainer takes; processors without bfloat16 arithmetic emulate it slowly."""
-        if self.precision != "auto":
-            return self.precision
-        native = self.accelerator == "cpu" and torch.ops.mkldnn._is_mkldnn_bf16_supported()
-        return "bf16-mixed" if native else "32-true"
 
     def accumulated(self, effective: int, per_step: int) -> int:
         """Return how many batches make an effective one of ``effective`` scans."""
