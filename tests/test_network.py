@@ -1,0 +1,76 @@
+"""Stage 1 as a whole: which rows it gives, and that neither company nor order changes them."""
+
+import pytest
+import torch
+
+from most.backbones import AsymmetricUNetSettings, AsymmetricUNetSmallSettings, ResidualUNetSettings
+from most.network import is_current
+from most.voxels import voxelise
+from tiny import GRID, TAXONOMY, cloud, tiny_predictor, window
+
+BACKBONES = [AsymmetricUNetSettings, AsymmetricUNetSmallSettings, ResidualUNetSettings]
+CLASSES, THINGS = TAXONOMY.num_classes - 1, len(TAXONOMY.things)
+
+
+def network(settings=AsymmetricUNetSmallSettings):
+    """A network whose batch statistics are those of some points, as after training."""
+    made = tiny_predictor(backbone=settings(widths=[4, 4, 8, 8], bev_channels=8)).network
+    made([window(cloud(300))])
+    return made.eval()
+
+
+@pytest.mark.parametrize("settings", BACKBONES)
+def test_a_batch_of_windows_with_past_sweeps(settings):
+    beyond = torch.tensor([[100.0, 0.0, 0.0], [float("nan"), 0.0, 0.0]])
+    samples = [window(torch.cat([beyond, cloud(60)]), cloud(40, 1)), window(cloud(50, 2), cloud(30, 3))]
+    output = network(settings)(samples)
+    voxels = voxelise(samples, GRID)
+    assert output.point_features.shape == (60 + 40 + 50 + 30, 4)
+    assert output.voxel_logits.shape == (len(voxels), CLASSES)
+    assert output.point_logits.shape == (60 + 50, CLASSES)
+    assert output.maps.heatmap.shape == (2, THINGS, 4, 4)
+    assert output.maps.extent.shape == (2, 3, 4, 4)
+    assert output.bev.shape == (2, 8, 4, 4)
+    assert output.point_logits.isfinite().all()
+
+
+def test_points_of_past_sweeps_have_no_logits():
+    samples = [window(cloud(5), cloud(7, 1)), window(cloud(3, 2), cloud(2, 3))]
+    output = network()(samples)
+    assert output.current.tolist() == [0, 1, 2, 3, 4, 12, 13, 14]
+    assert is_current(samples).tolist() == [True] * 5 + [False] * 7 + [True] * 3 + [False] * 2
+
+
+def test_past_sweeps_are_seen():
+    model, here = network(), cloud(50)
+    alone, with_past = model([window(here)]), model([window(here, cloud(50, 1))])
+    assert not torch.allclose(alone.point_logits, with_past.point_logits)
+
+
+@pytest.mark.parametrize("settings", BACKBONES)
+def test_windows_of_a_batch_do_not_see_each_other(settings):
+    model = network(settings)
+    first, second = window(cloud(60), cloud(20, 1)), window(cloud(50, 2), cloud(30, 3))
+    together, alone = model([first, second]), [model([first]), model([second])]
+    for name in ("voxel_logits", "point_logits", "point_features", "bev"):
+        apart = torch.cat([getattr(each, name) for each in alone])
+        assert torch.allclose(getattr(together, name), apart, atol=1e-5), name
+    for name, value in vars(together.maps).items():
+        assert torch.allclose(value, torch.cat([getattr(each.maps, name) for each in alone]), atol=1e-5), name
+
+
+def test_permuted_points_have_permuted_logits():
+    model, here, past = network(), cloud(80), cloud(40, 1)
+    order = torch.randperm(80, generator=torch.Generator().manual_seed(0))
+    logits = model([window(here, past)]).point_logits
+    again = model([window(here[order], past.flip(0))]).point_logits
+    assert not torch.allclose(logits, again, atol=1e-5)
+    assert torch.allclose(logits[order], again, atol=1e-5)
+
+
+def test_a_voxel_reads_the_map_cell_above_it():
+    model = network()
+    corners = torch.tensor([[-7.9, -7.9, 0.0], [-7.9, 7.9, 0.0], [7.9, -7.9, 0.0]])
+    samples = [window(corners), window(corners)]
+    assert model.voxel_cells(voxelise(samples, GRID)).tolist() == [0, 3, 12, 16, 19, 28]
+    assert model.bev_grid.cell == (4.0, 4.0)
