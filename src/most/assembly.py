@@ -2,15 +2,13 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from pickle import UnpicklingError
 from typing import Any
-from zipfile import BadZipFile
 
 import torch
 
 from most.config import Config, from_plain, to_plain
 from most.datasets.taxonomy import Taxonomy
-from most.errors import DataError
+from most.errors import ConfigError, DataError
 from most.heads import CentreHead, SemanticHead
 from most.inference import Predictor
 from most.network import Network
@@ -60,10 +58,15 @@ def describe(parts: dict[str, Any], taxonomy: Taxonomy, sweeps: int) -> dict[str
     """Return what a checkpoint says of its model, in plain types: it loads without running anything."""
     return {
         "format": FORMAT,
-        "taxonomy": {"name": taxonomy.name, "class_names": list(taxonomy.class_names), "things": list(taxonomy.things)},
+        "taxonomy": describe_taxonomy(taxonomy),
         "sweeps": sweeps,
         "parts": {group: to_plain(group, part) for group, part in parts.items()},
     }
+
+
+def describe_taxonomy(taxonomy: Taxonomy) -> dict[str, Any]:
+    """Return what the columns of logits and the channels of the heat map stand for."""
+    return {"name": taxonomy.name, "class_names": list(taxonomy.class_names), "things": list(taxonomy.things)}
 
 
 @dataclass
@@ -76,17 +79,26 @@ class Trained:
 
 
 def load_trained(path: Path) -> Trained:
-    """Read a checkpoint; a file that is none, or of another taxonomy, is a DataError."""
+    """Read a checkpoint; a file that is none, of another version or of another taxonomy, is a DataError."""
     checkpoint = read_checkpoint(path)
-    description = checkpoint["most"]
+    try:
+        return _assemble(checkpoint["most"], checkpoint["state_dict"])
+    except (ConfigError, KeyError, TypeError, AttributeError, RuntimeError) as error:
+        raise DataError(
+            f"{path}: expected a model that this version of most can make, found another ({error}); "
+            "load it with the version that wrote it, or train it again"
+        ) from error
+
+
+def _assemble(description: dict[str, Any], state: dict[str, Any]) -> Trained:
+    """Make the model that ``describe`` described, and load its weights."""
     taxonomy = Taxonomy.load(description["taxonomy"]["name"])
-    if list(taxonomy.class_names) != description["taxonomy"]["class_names"]:
-        raise DataError(f"{path}: expected the classes of taxonomy {taxonomy.name}, found others; train it again")
+    if describe_taxonomy(taxonomy) != description["taxonomy"]:
+        raise ConfigError(f"taxonomy {taxonomy.name}: expected its classes and things, found others")
     parts = {group: from_plain(group, description["parts"][group]) for group in GROUPS}
     network = build_network(parts, taxonomy)
     prefix = "network."
-    weights = {key[len(prefix) :]: value for key, value in checkpoint["state_dict"].items() if key.startswith(prefix)}
-    network.load_state_dict(weights)
+    network.load_state_dict({key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)})
     network.eval()
     return Trained(build_predictor(network, parts, taxonomy), taxonomy, description["sweeps"])
 
@@ -94,13 +106,18 @@ def load_trained(path: Path) -> Trained:
 def read_checkpoint(path: Path) -> dict[str, Any]:
     """Read a checkpoint of ours without running any code in it."""
     if not path.is_file():
-        raise DataError(f"{path}: expected a checkpoint, found no file")
+        raise DataError(f"{path}: expected a checkpoint, found no file; train a model first: python -m most.train")
     try:
         checkpoint = torch.load(path, map_location="cpu", weights_only=True)
-    except (UnpicklingError, BadZipFile, RuntimeError, EOFError, ValueError) as error:
-        raise DataError(f"{path}: expected a checkpoint, found something else or a truncated one ({error})") from error
-    if not isinstance(checkpoint, dict) or "most" not in checkpoint:
-        raise DataError(f"{path}: expected a checkpoint of most.train, found one of another program")
-    if checkpoint["most"]["format"] != FORMAT:
-        raise DataError(f"{path}: expected checkpoint format {FORMAT}, found {checkpoint['most']['format']}")
-    return dict(checkpoint)
+    except Exception as error:  # the unpickler has no error of its own: it stumbles over foreign bytes in many ways
+        raise DataError(
+            f"{path}: expected a checkpoint, found something else or a truncated one; copy it again ({error})"
+        ) from error
+    if not isinstance(checkpoint, dict) or not isinstance(checkpoint.get("most"), dict):
+        raise DataError(f"{path}: expected a checkpoint of most.train, found one of another program; choose another")
+    if (found := checkpoint["most"].get("format")) != FORMAT:
+        raise DataError(
+            f"{path}: expected checkpoint format {FORMAT}, found {found}; load it with the version of most that "
+            "wrote it, or train it again"
+        )
+    return checkpoint

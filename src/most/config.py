@@ -126,4 +126,8 @@ def from_plain(group: str, plain: Mapping[str, Any]) -> Any:
     if schema is None:
         known = ", ".join(COMPONENTS[group])
         raise ConfigError(f"{group}: expected one of {known}, found {plain['component']} (of a later version?)")
-    return typed(OmegaConf.merge(OmegaConf.structured(schema), plain["settings"]))
+    try:
+        merged = OmegaConf.merge(OmegaConf.structured(schema), plain["settings"])
+    except OmegaConfBaseException as error:
+        raise ConfigError(f"{group}.{error.full_key}: {error}") from error
+    return typed(merged)

@@ -1,0 +1,155 @@
+"""Checkpoints: what is loaded is what was saved, and whatever else a file holds is refused unexecuted."""
+
+import pickle
+from pathlib import Path
+
+import pytest
+import torch
+
+from most.assembly import FORMAT, describe, load_trained
+from most.backbones import AsymmetricUNetSettings, ResidualUNetSettings
+from most.errors import DataError
+from most.heads import SemanticHead
+from tiny import TAXONOMY, cloud, street, tiny_parts, tiny_predictor, window
+
+SAMPLES = [street(), window(cloud(40), cloud(20, 1))]
+
+
+def checkpoint(predictor, **changes):
+    """What training saves of a model: its description beside Lightning's own keys."""
+    state = {f"network.{key}": value for key, value in predictor.network.state_dict().items()}
+    description = describe(tiny_parts(**changes), TAXONOMY, sweeps=1)
+    return {"epoch": 3, "state_dict": state | {"quality.tp": torch.zeros(20)}, "most": description}
+
+
+def save(folder: Path, content) -> Path:
+    path = folder / "some.ckpt"
+    torch.save(content, path)
+    return path
+
+
+def tensors(prediction):
+    return [*vars(prediction.panoptic).values(), *vars(prediction.detections).values(), prediction.roi]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"backbone": AsymmetricUNetSettings(widths=[4, 4, 8, 8], bev_channels=8)},
+        {"backbone": ResidualUNetSettings(widths=[4, 4, 8, 8], bev_channels=4), "semantic_head": SemanticHead(False)},
+    ],
+)
+def test_a_loaded_model_predicts_bit_for_bit_what_the_saved_one_did(tmp_path, changes):
+    predictor = tiny_predictor(**changes)
+    predictor.network(SAMPLES)  # moves the batch statistics from where they start
+    predictor.network.centre_head.heatmap.bias.data += 2.0  # for some detections
+    predictor.network.eval()
+    trained = load_trained(save(tmp_path, checkpoint(predictor, **changes)))
+    assert (trained.sweeps, trained.taxonomy) == (1, TAXONOMY)
+    assert not trained.predictor.network.training
+    for before, after in zip(predictor(SAMPLES), trained.predictor(SAMPLES), strict=True):
+        assert len(before.detections) > 0
+        assert all(torch.equal(*pair) for pair in zip(tensors(before), tensors(after), strict=True))
+
+
+def test_a_checkpoint_is_plain(tmp_path):
+    path = save(tmp_path, checkpoint(tiny_predictor()))
+    assert torch.load(path, weights_only=True)["most"]["parts"]["grid"]["settings"]["voxel_size"] == [0.5, 0.5, 0.5]
+
+
+class Bomb:
+    """Leaves a file behind when it is unpickled."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return Path.touch, (self.path,)
+
+
+def test_code_in_a_checkpoint_is_not_run(tmp_path):
+    mark, armed = tmp_path / "ran", tmp_path / "armed.ckpt"
+    for write in (torch.save, lambda content, path: path.write_bytes(pickle.dumps(content))):
+        write(checkpoint(tiny_predictor()) | {"bomb": Bomb(mark)}, armed)
+        with pytest.raises(DataError, match=r"armed\.ckpt: expected a checkpoint, found something else"):
+            load_trained(armed)
+        assert not mark.exists()
+    pickle.loads(armed.read_bytes())
+    assert mark.exists()  # it was armed
+
+
+def test_a_checkpoint_cut_off_anywhere_is_refused(tmp_path):
+    whole = save(tmp_path, checkpoint(tiny_predictor())).read_bytes()
+    path = tmp_path / "part.ckpt"
+    for end in [0, 1, 10, *range(30, len(whole), len(whole) // 60)]:
+        path.write_bytes(whole[:end])
+        with pytest.raises(DataError, match=r"part\.ckpt: expected a checkpoint, found .* truncated one; copy it"):
+            load_trained(path)
+
+
+@pytest.mark.parametrize("content", [b"name: most\n", b"hello", b".", b"0", b"(", b"\x80", b"hjunk", b"PK\x05\x06"])
+def test_other_files_are_refused(tmp_path, content):
+    path = tmp_path / "notes.txt"
+    path.write_bytes(content)
+    with pytest.raises(DataError, match=r"notes\.txt: expected a checkpoint, found something else"):
+        load_trained(path)
+
+
+def test_a_missing_file_and_a_folder_are_refused(tmp_path):
+    for path in (tmp_path / "none.ckpt", tmp_path):
+        with pytest.raises(DataError, match="expected a checkpoint, found no file; train a model first"):
+            load_trained(path)
+
+
+def without(key):
+    return lambda content: content.pop(key)
+
+
+def setting(*keys, value):
+    """Overwrites a nested value."""
+
+    def change(content):
+        for key in keys[:-1]:
+            content = content[key]
+        content[keys[-1]] = value
+
+    return change
+
+
+OTHERS = {
+    "another program's": (without("most"), "found one of another program; choose another"),
+    "a description of another kind": (setting("most", value=7), "found one of another program"),
+    "another format": (setting("most", "format", value=FORMAT + 1), f"format {FORMAT}, found {FORMAT + 1}; load it"),
+    "no format": (setting("most", "format", value=None), f"format {FORMAT}, found None"),
+    "unknown taxonomy": (setting("most", "taxonomy", "name", value="mars"), "found 'mars'.*train it again"),
+    "other classes": (
+        setting("most", "taxonomy", "class_names", value=["void", "cat"]),
+        "taxonomy semantickitti: expected its classes",
+    ),
+    "other things": (
+        setting("most", "taxonomy", "things", value=[1, 2]),
+        "taxonomy semantickitti: expected its classes",
+    ),
+    "later component": (setting("most", "parts", "membership", "component", value="learnt"), "found learnt.*version"),
+    "later setting": (setting("most", "parts", "grid", "settings", "spin", value=1), "grid.*spin.*version that wrote"),
+    "out of range": (setting("most", "parts", "grid", "settings", "voxel_size", value=[0.0] * 3), "voxel_size"),
+    "a part less": (lambda content: content["most"]["parts"].pop("encoder"), "encoder.*train it again"),
+    "no weights": (without("state_dict"), "state_dict.*train it again"),
+    "a weight less": (lambda content: content["state_dict"].popitem() and content["state_dict"].popitem(), "Missing"),
+    "wider": (setting("most", "parts", "encoder", "settings", "widths", value=[8, 6]), "size mismatch.*train it"),
+}
+
+
+@pytest.mark.parametrize("other", OTHERS)
+def test_checkpoints_of_other_models_are_refused_with_a_remedy(tmp_path, other):
+    change, message = OTHERS[other]
+    content = checkpoint(tiny_predictor())
+    change(content)
+    with pytest.raises(DataError, match=rf"(?s)some\.ckpt: expected.*{message}"):
+        load_trained(save(tmp_path, content))
+
+
+def test_a_list_is_no_checkpoint(tmp_path):
+    with pytest.raises(DataError, match="another program"):
+        load_trained(save(tmp_path, [1, 2]))
