@@ -43,9 +43,9 @@ class DetectionTraining:
         if not 0 < self.warm_up < 1:
             raise ConfigError(f"stage.warm_up: expected a share in (0, 1), found {self.warm_up}")
         for name in ("max_lr", "initial_divisor", "clip", "batch_size", "epochs"):
-            if getattr(self, name) <= 0:
+            if not getattr(self, name) > 0:
                 raise ConfigError(f"stage.{name}: expected a positive number, found {getattr(self, name)}")
-        if self.weight_decay < 0:
+        if not self.weight_decay >= 0:
             raise ConfigError(f"stage.weight_decay: expected a number >= 0, found {self.weight_decay}")
 
 
@@ -126,7 +126,8 @@ class DetectionStage(L.LightningModule):
     def on_validation_epoch_end(self) -> None:
         """Log the split's figures, fractions in [0, 1]."""
         figures = self.quality.compute() | self.membership_accuracy.compute()
-        self.report = {"epoch": self.current_epoch, "panoptic": figures | {"per_class": self.quality.per_class()}}
+        epochs = self.current_epoch + int(self.trainer.state.fn == "fit")  # the running one is not counted yet
+        self.report = {"epochs": epochs, "panoptic": figures | {"per_class": self.quality.per_class()}}
         self.log_dict({f"val/{name}": value for name, value in figures.items()})
         self.quality.reset()
         self.membership_accuracy.reset()
@@ -138,6 +139,7 @@ class DetectionStage(L.LightningModule):
     def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
         """Add what it takes to make the network again."""
         checkpoint["most"] = self.description
+        checkpoint["most_epochs"] = self.training_settings.epochs
 
     def configure_optimizers(self) -> OptimizerLRSchedulerConfig:
         """See :func:`one_cycle`."""
@@ -149,11 +151,16 @@ class DetectionStage(L.LightningModule):
 def one_cycle(
     parameters: Iterable[Tensor], settings: DetectionTraining, steps: int
 ) -> tuple[torch.optim.Optimizer, torch.optim.lr_scheduler.OneCycleLR]:
-    """Return Adam or AdamW and its one-cycle schedule over ``steps`` (supplement, section II)."""
+    """Return Adam or AdamW and its one-cycle schedule over ``steps`` (supplement, section II).
+
+    However few steps there are, the first is at the initial rate and the second is the earliest at the highest.
+    """
     kind = torch.optim.AdamW if settings.optimizer == "adamw" else torch.optim.Adam
     optimizer = kind(parameters, lr=settings.max_lr, weight_decay=settings.weight_decay)
+    steps = max(steps, 3)
+    warm_up = max(settings.warm_up, 2 / steps)  # torch divides by zero where the warm-up is one step long
     schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer, settings.max_lr, steps, pct_start=settings.warm_up, div_factor=settings.initial_divisor
+        optimizer, settings.max_lr, steps, pct_start=warm_up, div_factor=settings.initial_divisor
     )
     return optimizer, schedule
 
