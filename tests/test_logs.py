@@ -1,0 +1,54 @@
+"""Loggers: each kind, and that no account is needed."""
+
+import os
+
+import pytest
+from lightning.pytorch.loggers import CSVLogger, WandbLogger
+
+from most.errors import ConfigError
+from most.logs import LoggerSettings
+
+
+@pytest.fixture
+def no_account(monkeypatch):
+    """No key; and what ``build`` sets in the environment is put back."""
+    monkeypatch.delenv("WANDB_API_KEY", raising=False)
+    monkeypatch.setenv("WANDB_MODE", "disabled")
+    return monkeypatch
+
+
+def test_none_logs_nowhere(tmp_path):
+    assert LoggerSettings(kind="none").build(tmp_path, "a", {}) is False
+
+
+def test_csv_is_written_into_the_run_folder(tmp_path):
+    logger = LoggerSettings(kind="csv").build(tmp_path, "a", {})
+    assert isinstance(logger, CSVLogger)
+    logger.log_metrics({"train/loss": 2.5}, step=0)
+    logger.save()
+    assert (tmp_path / "csv" / "metrics.csv").read_text().splitlines() == ["step,train/loss", "0,2.5"]
+
+
+def test_wandb_is_offline_unless_asked_and_knows_the_configuration(tmp_path, no_account):
+    no_account.setenv("WANDB_API_KEY", "0" * 40)
+    logger = LoggerSettings(project="streets", group="all").build(tmp_path, "a", {"seed": 1})
+    assert isinstance(logger, WandbLogger)
+    assert os.environ["WANDB_MODE"] == "offline"
+    init = logger._wandb_init  # what the run will be started with, at the first thing that is logged
+    assert (init["name"], init["project"], init["group"], init["config"]) == ("a", "streets", "all", {"seed": 1})
+    assert init["dir"] == str(tmp_path)
+
+
+@pytest.mark.parametrize(("key", "mode"), [(None, "offline"), ("0" * 40, "online")])
+def test_online_needs_a_key(tmp_path, no_account, key, mode):
+    if key:
+        no_account.setenv("WANDB_API_KEY", key)
+    LoggerSettings(mode="online").build(tmp_path, "a", {})
+    assert os.environ["WANDB_MODE"] == mode
+
+
+@pytest.mark.parametrize("wrong", [{"kind": "tensorboard"}, {"mode": "cloud"}, {"pictures": -1}])
+def test_impossible_settings_are_refused(wrong):
+    ((name, value),) = wrong.items()
+    with pytest.raises(ConfigError, match=rf"logger\.{name}: expected .*found {value}"):
+        LoggerSettings(**wrong)
