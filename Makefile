@@ -19,9 +19,10 @@ $(READY): pyproject.toml
 
 # Simulate streets, train on some, label others, score them, draw one.
 demo: setup
+	rm -rf $(DEMO)/run $(DEMO)/predictions
 	$(RUN) -m most.simulate simulation=demo out=$(DEMO)/streets
 	$(RUN) -m most.train +experiment=sim_demo dataset.root=$(DEMO)/streets dataset.tables=$(DEMO)/tables \
-	  paths.output=$(DEMO)/outputs hydra.run.dir=$(DEMO)/run
+	  hydra.run.dir=$(DEMO)/run
 	$(RUN) -m most.predict checkpoint=$(DEMO)/run/checkpoints/last.ckpt split=test out=$(DEMO)/predictions \
 	  dataset=simulated dataset.root=$(DEMO)/streets
 	$(RUN) -m most.evaluate predictions=$(DEMO)/predictions split=test out=$(DEMO)/metrics.json \

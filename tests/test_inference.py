@@ -91,9 +91,10 @@ def test_the_voxels_of_another_window_or_class_of_its_points_do_not_matter():
     assert second.panoptic.semantics.tolist() == [ROAD, ROAD]
 
 
-def test_points_out_of_range_read_voxels_of_past_sweeps_too():
-    (prediction,) = known()([window(torch.tensor([[0.0, 90.0, 0.0]]), torch.tensor([[0.0, 7.0, 0.0]]))])
-    assert prediction.panoptic.semantics.tolist() == [CAR]
+def test_points_out_of_range_do_not_read_voxels_of_past_sweeps():
+    here, past = torch.tensor([[0.0, 90.0, 0.0], [0.0, -7.0, 0.0]]), torch.tensor([[0.0, 7.0, 0.0]])
+    (prediction,) = known()([window(here, past)])
+    assert prediction.panoptic.semantics.tolist() == [ROAD, ROAD]
 
 
 @pytest.mark.parametrize("points", [torch.zeros(0, 3), torch.full((3, 3), 99.0), torch.full((2, 3), math.nan)])
@@ -101,7 +102,7 @@ def test_points_out_of_range_read_voxels_of_past_sweeps_too():
 def test_a_scan_that_is_empty_or_wholly_out_of_range(points, make):
     predictor = make()
     predictor.network.eval()
-    for samples in ([window(points)], [window(cloud(20)), window(points)]):
+    for samples in ([window(points)], [window(points, cloud(9))], [window(cloud(20)), window(points)]):
         prediction = predictor(samples)[-1]
         check_covered(prediction, len(points))
         assert prediction.panoptic.semantics.tolist() == [FALLBACK] * len(points)

@@ -52,6 +52,12 @@ def test_overlaps_go_to_the_most_confident_membership_or_detection():
     assert label([[0.5, 0.0, 0.0]], [1], found, rated, overlap="order").panoptic.ids.tolist() == [1]
 
 
+def test_equal_memberships_go_to_the_more_confident_detection():
+    found = detections([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [1, 1])
+    rated = Rated({(0, 0): 0.9, (0, 1): 0.9})
+    assert label([[0.5, 0.0, 0.0]], [1], found, rated).panoptic.ids.tolist() == [1]
+
+
 def test_a_membership_of_one_half_is_none():
     found = detections([[0.0, 0.0, 0.0]], [1])
     fused = label([[0.5, 0.0, 0.0]], [1], found, Rated({(0, 0): 0.5}), unclaimed="zero")

@@ -41,6 +41,12 @@ def test_heights_are_clipped_and_sides_are_not():
     assert voxels.coordinates[voxels.point_voxel].tolist() == [[0, 4, 4, 0], [0, 4, 4, 3], [0, 0, 4, 2]]
 
 
+def test_a_point_without_a_finite_intensity_is_no_input():
+    batch = sample((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    batch.points[0, 3] = math.nan
+    assert voxelise([batch], GRID).inputs.tolist() == [1]
+
+
 def test_a_window_without_points_has_no_voxels():
     assert len(voxelise([sample()], GRID)) == 0
 

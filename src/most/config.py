@@ -85,6 +85,10 @@ class Config:
     logger: Any = None
     paths: Paths = field(default_factory=Paths)
 
+    def __post_init__(self) -> None:
+        if not 0 <= self.seed < 2**32:
+            raise ConfigError(f"seed: expected a number in [0, 2^32), found {self.seed}")
+
 
 def conf_dir() -> Path:
     """The folder of YAML files: the one packed into the wheel, else the checkout's."""

@@ -23,13 +23,13 @@ class PeakDetector:
 
     def __post_init__(self) -> None:
         if self.window < 1 or self.window % 2 == 0:
-            raise ConfigError(f"detector.window: expected an odd number of cells, found {self.window}")
+            raise ConfigError(f"inference.detector.window: expected an odd number of cells, found {self.window}")
         if not 0 <= self.threshold < 1:
-            raise ConfigError(f"detector.threshold: expected a number in [0, 1), found {self.threshold}")
+            raise ConfigError(f"inference.detector.threshold: expected a number in [0, 1), found {self.threshold}")
         if self.most < 1:
-            raise ConfigError(f"detector.most: expected at least one detection, found {self.most}")
+            raise ConfigError(f"inference.detector.most: expected at least one detection, found {self.most}")
         if self.overlap < 0:
-            raise ConfigError(f"detector.overlap: expected a number >= 0, found {self.overlap}")
+            raise ConfigError(f"inference.detector.overlap: expected a number >= 0, found {self.overlap}")
 
     def __call__(self, maps: BevMaps, things: list[int], grid: BevGrid) -> list[Detections]:
         """Return the detections of each window of a batch; ``things`` are the class ids of the heat map's channels."""

@@ -60,6 +60,8 @@ def classify(output: NetworkOutput, samples: list[Sample], grid: Grid, fallback:
     """Return the class of every point of each current sweep; points out of range read the nearest voxel's."""
     where = output.voxels.inputs[output.current]
     point_classes, voxel_classes = output.point_logits.argmax(1) + 1, output.voxel_logits.argmax(1) + 1
+    supervised = torch.zeros(len(output.voxels), dtype=torch.bool, device=where.device)
+    supervised[output.voxels.point_voxel[output.current]] = True  # the loss reaches no voxel of past sweeps alone
     start, results = 0, []  # where the window's points begin among the batch's
     for index, sample in enumerate(samples):
         first, last = torch.searchsorted(where, torch.tensor([start, start + sample.num_current], device=where.device))
@@ -67,7 +69,7 @@ def classify(output: NetworkOutput, samples: list[Sample], grid: Grid, fallback:
         outside = torch.ones(sample.num_current, dtype=torch.bool, device=where.device)
         semantics[where[first:last] - start] = point_classes[first:last]
         outside[where[first:last] - start] = False
-        mine = output.voxels.coordinates[:, 0] == index
+        mine = (output.voxels.coordinates[:, 0] == index) & supervised
         if outside.any() and mine.any():
             points = sample.points[: sample.num_current][outside]
             nearest = nearest_voxel(points, output.voxels.coordinates[mine, 1:], grid)

@@ -30,7 +30,7 @@ class LossWeights:
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if value < 0:
-                raise ConfigError(f"losses.{name}: expected a number >= 0, found {value}")
+                raise ConfigError(f"stage.losses.{name}: expected a number >= 0, found {value}")
 
 
 def class_weights(counts: Int64[Tensor, "classes"], class_balance: float) -> Float[Tensor, "classes"]:

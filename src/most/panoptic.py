@@ -41,11 +41,15 @@ class Fusion:
 
     def __post_init__(self) -> None:
         if self.overlap not in ("confident", "order"):
-            raise ConfigError(f"fusion.overlap: expected confident or order, found {self.overlap}")
+            raise ConfigError(f"inference.fusion.overlap: expected confident or order, found {self.overlap}")
         if self.unclaimed not in UNCLAIMED:
-            raise ConfigError(f"fusion.unclaimed: expected one of {', '.join(UNCLAIMED)}, found {self.unclaimed}")
-        if self.reach < 1 or self.cluster_radius <= 0:
-            raise ConfigError("fusion: expected reach >= 1 and cluster_radius > 0")
+            raise ConfigError(
+                f"inference.fusion.unclaimed: expected one of {', '.join(UNCLAIMED)}, found {self.unclaimed}"
+            )
+        if not self.reach >= 1:
+            raise ConfigError(f"inference.fusion.reach: expected a number >= 1, found {self.reach}")
+        if not self.cluster_radius > 0:
+            raise ConfigError(f"inference.fusion.cluster_radius: expected metres above 0, found {self.cluster_radius}")
 
 
 @dataclass
@@ -85,7 +89,7 @@ def fuse(
 
 def _best(count: int, pairs: Pairs, rank: Float[Tensor, "pairs"]) -> Int64[Tensor, "points"]:
     """Return for each point the detection of its highest-ranked pair (the first of equals), -1 where it has none."""
-    order = torch.argsort(rank, stable=True).flip(0)
+    order = torch.argsort(rank, descending=True, stable=True)
     best = torch.full((count,), -1, dtype=torch.long, device=rank.device)
     taken, first = np.unique(pairs.points[order].cpu().numpy(), return_index=True)
     chosen = order[torch.as_tensor(first, device=rank.device)]

@@ -38,7 +38,7 @@ def predict(config: PredictConfig) -> None:
     trained = load_trained(checkpoint)
     reader = SemanticKITTI(dataset.root, dataset.splits)
     frames = reader.frames(config.split)
-    claim_folder(out, checkpoint, config.split)
+    claim_folder(out, checkpoint, reader, config.split)
     frames = unfinished(reader, frames, out)
     windows = WindowDataset(reader, frames, trained.sweeps)
     loader = DataLoader(windows, dataset.batch_size, num_workers=dataset.workers, collate_fn=list)

@@ -20,17 +20,26 @@ from most.structures import Panoptic, Sample
 RECORD = "prediction.json"
 
 
-def claim_folder(out: Path, checkpoint: Path, split: str) -> None:
-    """Note in ``out`` what is written there; another model's predictions are not mixed in, the same one's go on."""
-    record = {"checkpoint_sha256": hashlib.sha256(checkpoint.read_bytes()).hexdigest(), "split": split}
-    path = out / RECORD
+def claim_folder(out: Path, checkpoint: Path, reader: Reader, split: str) -> None:
+    """Note in ``out`` what is written there; another model's or dataset's are not mixed in, the same one's go on."""
+    claim = {
+        "checkpoint_sha256": hashlib.sha256(checkpoint.read_bytes()).hexdigest(),
+        "dataset": str(Path(reader.root).resolve()),
+        "split": split,
+        "sequences": reader.sequences(split),
+    }
+    path, record = out / RECORD, json.dumps(claim)
+    if out.exists() and not out.is_dir():
+        raise DataError(f"{out}: expected a new or empty folder, found a file; choose another out")
     if not path.is_file():
         if out.is_dir() and any(out.iterdir()):
             raise DataError(f"{out}: expected a new or empty folder, found other files; choose another out")
         with atomic_write(path, "w") as file:
-            json.dump(record, file)
-    elif json.loads(path.read_text()) != record:
-        raise DataError(f"{out}: holds predictions of another checkpoint or split; choose another out, or remove it")
+            file.write(record)
+    elif path.read_bytes() != record.encode():  # whatever it holds, it need not be JSON
+        raise DataError(
+            f"{out}: holds predictions of another checkpoint, dataset or split; choose another out, or remove it"
+        )
 
 
 def unfinished(reader: Reader, frames: list[Frame], out: Path) -> list[Frame]:

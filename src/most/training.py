@@ -1,15 +1,19 @@
 """A training run put together: stage, trainer, callbacks, logger."""
 
 from pathlib import Path
+from typing import Any
 
 import lightning as L
+import torch
 from lightning.pytorch.callbacks import Callback, LearningRateMonitor, ModelCheckpoint, TQDMProgressBar
 from omegaconf import OmegaConf
 
-from most.assembly import build_network, build_predictor, describe, model_parts
+from most.assembly import build_network, build_predictor, describe, model_parts, read_checkpoint
 from most.config import Config
 from most.datasets.class_counts import class_counts
 from most.datasets.datamodule import SemanticKITTIDataModule
+from most.datasets.taxonomy import Taxonomy
+from most.errors import ConfigError
 from most.stages.callbacks import Throughput
 from most.stages.detection import DetectionStage
 from most.viz.callback import BevPictures
@@ -20,7 +24,14 @@ def build_stage(config: Config, data: SemanticKITTIDataModule) -> DetectionStage
     taxonomy, parts = data.reader.taxonomy, model_parts(config)
     predictor = build_predictor(build_network(parts, taxonomy), parts, taxonomy)
     description = describe(parts, taxonomy, config.dataset.sweeps)
-    return DetectionStage(predictor, taxonomy, class_counts(data.reader, "train"), config.stage, description)
+    balanced = config.stage.losses.class_balance > 0
+    counts = class_counts(data.reader, "train") if balanced else torch.ones(taxonomy.num_classes, dtype=torch.long)
+    return DetectionStage(predictor, taxonomy, counts, config.stage, description)
+
+
+def checkpoint(folder: Path, name: str, **when: Any) -> ModelCheckpoint:
+    """Keep one file ``checkpoints/<name>.ckpt``; a run that goes on in its folder overwrites it."""
+    return ModelCheckpoint(folder / "checkpoints", name, enable_version_counter=False, **when)
 
 
 def build_trainer(config: Config, folder: Path) -> L.Trainer:
@@ -28,18 +39,19 @@ def build_trainer(config: Config, folder: Path) -> L.Trainer:
     settings, plain = config.trainer, OmegaConf.to_container(OmegaConf.structured(config))
     logger = config.logger.build(folder, config.name, plain)
     callbacks: list[Callback] = [
-        ModelCheckpoint(folder / "checkpoints", "best", monitor="val/pq", mode="max", save_last=True),
+        checkpoint(folder, "last", every_n_epochs=1, save_on_train_epoch_end=True),
+        checkpoint(folder, "best", monitor="val/pq", mode="max"),
         Throughput(),
     ]
     if logger:
-        callbacks += [LearningRateMonitor("step"), BevPictures(config.logger.pictures, folder / "pictures")]
+        callbacks.append(LearningRateMonitor("step"))
+    if config.logger.pictures:
+        callbacks.append(BevPictures(config.logger.pictures, folder / "pictures"))
     if settings.progress_bar:
         callbacks.append(TQDMProgressBar(leave=True))
     return L.Trainer(
         accelerator=settings.accelerator,
-        devices=settings.devices,
-        num_nodes=settings.nodes,
-        strategy=settings.strategy,
+        devices=1,
         precision=settings.precision,
         max_epochs=config.stage.epochs,
         accumulate_grad_batches=settings.accumulated(config.stage.batch_size, config.dataset.batch_size),
@@ -54,3 +66,16 @@ def build_trainer(config: Config, folder: Path) -> L.Trainer:
         enable_model_summary=False,
         default_root_dir=folder,
     )
+
+
+def check_resume(config: Config, taxonomy: Taxonomy) -> None:
+    """Refuse to go on from a checkpoint of another model, or towards another number of epochs."""
+    path = Path(str(config.resume))
+    saved = read_checkpoint(path)
+    if saved["most"] != describe(model_parts(config), taxonomy, config.dataset.sweeps):
+        raise ConfigError(f"resume: {path} was trained with another model or dataset; repeat its own settings")
+    if saved["most_epochs"] != config.stage.epochs:
+        raise ConfigError(
+            f"stage.epochs: expected {saved['most_epochs']}, as the run of {path} began, found {config.stage.epochs}; "
+            "the learning rate's schedule is made for that length"
+        )

@@ -57,10 +57,10 @@ class Grid:
         return BevGrid((x, y), cell, (-(-width // stride), -(-depth // stride)))
 
     def in_range(self, points: Float[Tensor, "points channels"]) -> Bool[Tensor, "points"]:
-        """Whether each point is finite and within the grid's sides (its height does not matter)."""
+        """Whether each point is finite in all channels and within the grid's sides (its height does not matter)."""
         lower, upper = points.new_tensor(self.lower[:2]), points.new_tensor(self.upper[:2])
         inside = (points[:, :2] >= lower) & (points[:, :2] < upper)
-        return inside.all(1) & points[:, :3].isfinite().all(1)
+        return inside.all(1) & points.isfinite().all(1)
 
     def cells(self, points: Float[Tensor, "points channels"]) -> Int64[Tensor, "points 3"]:
         """The voxel of each point in range; heights are clipped into the border layers."""

@@ -53,7 +53,9 @@ def test_every_option_names_a_schema():
     [
         ("stage.max_lr=-1", "stage.max_lr"),
         ("grid.voxel_size=[0,1,1]", "grid.voxel_size"),
-        ("trainer.devices=0", "trainer.devices"),
+        ("trainer.precision=foo", "trainer.precision"),
+        ("seed=-1", "seed"),
+        ("stage.max_lr=nan", "stage.max_lr"),
         ("stage.losses.heatmap=-1", "losses.heatmap"),
         ("backbone.widths=[1,2]", "backbone.widths"),
     ],

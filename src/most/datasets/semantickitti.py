@@ -30,7 +30,7 @@ class Splits:
     def __post_init__(self) -> None:
         for split in SPLITS:
             names = [str(name) for name in getattr(self, split)]
-            if any(not re.fullmatch(r"\d\d", name) for name in names):
+            if any(not re.fullmatch(r"[0-9]{2}", name) for name in names):
                 quoted = ", ".join(f"'{name:0>2}'" for name in names)
                 raise ConfigError(
                     f"dataset.splits.{split}: expected quoted sequence names of two digits, found "
@@ -142,7 +142,7 @@ class SemanticKITTI:
         if not paths:
             raise DataError(f"{folder}: expected scans 000000.{suffix} and so on, found none; is the tree complete?")
         for path in paths:
-            if not re.fullmatch(r"\d{6}", path.stem):
+            if not re.fullmatch(r"[0-9]{6}", path.stem):
                 raise DataError(f"{path}: expected a name of six digits, found {path.stem!r}; rename or remove it")
         return [Frame(sequence, int(path.stem)) for path in paths]
 

@@ -22,9 +22,9 @@ class RegionOfInterest:
 
     def __post_init__(self) -> None:
         if self.margin <= 0:
-            raise ConfigError(f"roi.margin: expected a positive number, found {self.margin}")
+            raise ConfigError(f"inference.roi.margin: expected a positive number, found {self.margin}")
         if self.slack < 0:
-            raise ConfigError(f"roi.slack: expected metres >= 0, found {self.slack}")
+            raise ConfigError(f"inference.roi.slack: expected metres >= 0, found {self.slack}")
 
     def half_sizes(self, extents: Float[Tensor, "detections 3"]) -> Float[Tensor, "detections 3"]:
         """Return each region's half-sizes, m; a sphere's are all its largest."""

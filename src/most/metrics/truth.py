@@ -73,7 +73,7 @@ def find_instances(
     taxonomy: Taxonomy,
 ) -> Instances:
     """The instances of one scan with their modal centres, which is all that matching takes: no extents, no motion."""
-    own = taxonomy.is_thing(semantics) & (taxonomy.instance_of(labels) != 0)
+    own = taxonomy.is_thing(semantics) & (taxonomy.instance_of(labels) != 0) & points.isfinite().all(1)
     keys, owner, counts = torch.unique(labels[own], return_inverse=True, return_counts=True)
     sums = torch.zeros(len(keys), 3, dtype=torch.float64).index_add_(0, owner, points[own].double())
     return Instances(

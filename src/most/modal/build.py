@@ -95,6 +95,7 @@ def centred_differences(
 def _measure(sweep: Sweep, labels: Int64[Tensor, "points"], rules: LabelRules) -> _Frame:
     """Return the rows of one sweep: keys ascending, centres the mean of their points, outlines in world heading."""
     is_instance = rules.is_thing(rules.to_training(labels)) & (rules.instance_of(labels) != 0)
+    is_instance &= sweep.points[:, :3].isfinite().all(1)
     points = sweep.points[is_instance, :3].double()
     keys, owners, counts = torch.unique(labels[is_instance], return_inverse=True, return_counts=True)
     centres = points.new_zeros(len(keys), 3).index_add_(0, owners, points) / counts[:, None]

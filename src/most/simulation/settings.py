@@ -71,7 +71,7 @@ class SimulationSettings:
     traffic: TrafficSettings = field(default_factory=TrafficSettings)
 
     def __post_init__(self) -> None:
-        named = all(isinstance(name, str) and re.fullmatch(r"\d\d", name) for name in self.sequences)
+        named = all(isinstance(name, str) and re.fullmatch(r"[0-9]{2}", name) for name in self.sequences)
         _expect("sequences", named, 'names of two digits, quoted in YAML ("07")', self.sequences)
         unique = len(set(self.sequences)) == len(self.sequences) > 0
         _expect("sequences", unique, "each name once, at least one", self.sequences)

@@ -47,8 +47,8 @@ def draw_prediction(sample: Sample, prediction: Prediction, taxonomy: Taxonomy) 
     """Draw one sweep's prediction, beside its truth where that is known."""
     truth = None
     if sample.semantics is not None and sample.labels is not None:
-        things = taxonomy.is_thing(sample.semantics)
-        truth = Panoptic(sample.semantics, sample.labels.where(things, 0))
+        has_id = taxonomy.is_thing(sample.semantics) & (taxonomy.instance_of(sample.labels) != 0)
+        truth = Panoptic(sample.semantics, sample.labels.where(has_id, 0))
     return draw_bev(
         sample.points[: sample.num_current],
         truth,
