@@ -49,17 +49,9 @@ def test_the_wheel_holds_every_module_configuration_and_taxonomy(wheel):
     assert not [name for name in held if name.endswith((".pyc", ".bin", ".label", ".ckpt"))]
 
 
-@pytest.mark.parametrize(
-    ("command", "arguments", "expected"),
-    [
-        ("train", ["+experiment=semkitti_max"], ["sweeps: 10", "- 0.075", "max_lr: 0.001", "epochs: 20"]),
-        ("predict", ["checkpoint=a.ckpt", "out=b"], ["checkpoint: a.ckpt", "split: val"]),
-        ("simulate", ["simulation=demo"], ["columns:"]),
-    ],
-)
-def test_commands_compose_from_the_packed_configuration(site, tmp_path, command, arguments, expected):
-    printed = run(tmp_path, "-m", f"most.{command}", "--cfg", "job", *arguments, path=site)
-    for line in expected:
+def test_training_composes_from_the_packed_configuration(site, tmp_path):
+    printed = run(tmp_path, "-m", "most.train", "--cfg", "job", "+experiment=semkitti_max", path=site)
+    for line in ("sweeps: 10", "- 0.075", "max_lr: 0.001", "epochs: 20"):
         assert line in printed, line
     assert not any(tmp_path.iterdir())
 

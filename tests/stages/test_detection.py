@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+import lightning as L
 import pytest
 import torch
 
@@ -115,33 +116,36 @@ def test_a_network_learns_a_street_and_finds_its_cars():
 
 
 def perfect(samples):
-    """Predicts the truth, where there is one."""
+    """Predicts the truth."""
     return [
         Prediction(
-            Panoptic(sample.semantics, (sample.labels >> 16)),
+            Panoptic(sample.semantics, TAXONOMY.instance_of(sample.labels)),
             Detections(
                 sample.instances.classes, torch.ones(len(sample.instances)), sample.instances.centres,
                 sample.instances.extents, sample.instances.velocities,
             ),
             sample.instances.extents + 0.1,
-            (sample.labels >> 16) - 1,
+            TAXONOMY.instance_of(sample.labels) - 1,
         )
-        if sample.instances
-        else None
         for sample in samples
     ]  # fmt: skip
 
 
-def test_validation_scores_what_has_a_truth_and_starts_afresh():
+def test_validation_scores_a_split_and_starts_afresh():
     made = stage()
-    made.predictor = perfect
-    assert len(made.validation_step([street(), window(cloud(20))], 0)["predictions"]) == 2
+    made.predictor, made.trainer = perfect, L.Trainer(accelerator="cpu", logger=False, enable_checkpointing=False)
+    assert len(made.validation_step([street(), street()], 0)["predictions"]) == 2
     made.on_validation_epoch_end()
     assert made.logged["val/pq_stuff_present"] == made.logged["val/membership_accuracy"] == 1
-    figures = made.report["panoptic"]["per_class"]
-    assert figures["road"]["pq"] == 1
+    assert made.report["panoptic"]["per_class"]["road"]["pq"] == 1
     made.on_validation_epoch_end()
     assert made.report["panoptic"]["per_class"]["road"]["tp"] == 0
+
+
+def test_sweeps_without_a_truth_are_predicted_and_not_scored():
+    made = stage().eval()
+    assert len(made.validation_step([window(cloud(20))], 0)["predictions"]) == 1
+    assert made.quality.per_class()["road"]["fp"] == made.membership_accuracy.counts.sum() == 0
 
 
 def test_checkpoints_carry_the_description():

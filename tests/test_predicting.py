@@ -1,0 +1,169 @@
+"""Writing predictions: what is read back, what is left to do, and what is never left behind."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from most import predicting
+from most.datasets.dataset import WindowDataset
+from most.datasets.reader import Frame
+from most.datasets.semantickitti import SemanticKITTI, Splits
+from most.errors import DataError
+from most.inference import Prediction
+from most.predicting import claim_folder, read_prediction, unfinished, write_prediction, write_predictions
+from most.structures import Detections, Panoptic
+from semantickitti_tree import write_sequence
+from tiny import CAR, PERSON, ROAD, TAXONOMY, tiny_predictor
+
+ONE_CAR = Detections(
+    torch.tensor([CAR]), torch.tensor([0.75]), torch.tensor([[1.0, 2.0, -0.5]]), torch.tensor([[2.0, 1.0, 0.7]]),
+    torch.tensor([[0.5, -3.0]]),
+)  # fmt: skip
+PREDICTION = Prediction(
+    Panoptic(torch.tensor([CAR, ROAD, CAR, PERSON]), torch.tensor([1, 0, 2, 65535])), ONE_CAR,
+    torch.tensor([[2.9, 1.6, 1.2]]), torch.tensor([0, -1, -1, -1]),
+)  # fmt: skip
+NOTHING = Prediction(
+    Panoptic(torch.zeros(0, dtype=torch.int64), torch.zeros(0, dtype=torch.int64)),
+    ONE_CAR.select(torch.zeros(1, dtype=torch.bool)), torch.zeros(0, 3), torch.zeros(0, dtype=torch.int64),
+)  # fmt: skip
+
+
+@pytest.fixture
+def reader(tmp_path):
+    write_sequence(tmp_path / "tree", "08", range(3))
+    return SemanticKITTI(tmp_path / "tree", Splits(val=["08"]))
+
+
+def files(folder):
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+
+
+def write_all(reader, frames, out):
+    windows = WindowDataset(reader, frames, previous=1)
+    batches = [[windows[index]] for index in range(len(windows))]
+    write_predictions(tiny_predictor(), batches, reader, out, len(frames), torch.device("cpu"))
+
+
+@pytest.mark.parametrize("prediction", [PREDICTION, NOTHING])
+def test_what_is_written_is_read_back(tmp_path, prediction):
+    path = tmp_path / "sequences" / "08" / "predictions" / "000000.label"
+    write_prediction(prediction, path, TAXONOMY)
+    again = read_prediction(path, TAXONOMY)
+    for part in ("panoptic", "detections"):
+        for name, value in vars(getattr(prediction, part)).items():
+            assert torch.equal(getattr(getattr(again, part), name), value), name
+    assert torch.equal(again.roi, prediction.roi)
+    assert torch.equal(again.claimed, prediction.claimed)
+
+
+def test_an_id_too_large_for_the_format_is_refused_unwritten(tmp_path):
+    path = tmp_path / "sequences" / "08" / "predictions" / "000000.label"
+    with pytest.raises(DataError, match=r"instance ids: expected 0\.\.65535, found 0\.\.65536"):
+        write_prediction(replace(PREDICTION, panoptic=Panoptic(torch.tensor([1, 9]), torch.tensor([65536, 0]))), path,
+                         TAXONOMY)  # fmt: skip
+    assert not path.exists()
+
+
+def test_a_prediction_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(DataError, match=r"000000\.label: expected a label file, found none"):
+        read_prediction(tmp_path / "000000.label", TAXONOMY)
+
+
+def test_every_sweep_gets_labels_and_detections(reader, tmp_path):
+    out, frames = tmp_path / "out", reader.frames("val")
+    write_all(reader, frames, out)
+    names = [f"sequences/08/{kind}" for kind in ("detections/{}.npz", "predictions/{}.label")]
+    assert files(out) == [name.format(f"{index:06d}") for name in names for index in range(3)]
+    for frame in frames:
+        found = read_prediction(reader.prediction_path(out, frame), TAXONOMY).panoptic
+        assert len(found.semantics) == len(reader.labels(frame))
+        assert (found.semantics > 0).all()
+
+
+def test_only_what_is_missing_is_left_to_do(reader, tmp_path):
+    out, frames = tmp_path / "out", reader.frames("val")
+    assert unfinished(reader, frames, out) == frames
+    write_all(reader, frames, out)
+    assert unfinished(reader, frames, out) == []
+    before = {path: (out / path).read_bytes() for path in files(out)}
+    reader.prediction_path(out, frames[1]).unlink()
+    assert unfinished(reader, frames, out) == [Frame("08", 1)]
+    write_all(reader, [Frame("08", 1)], out)
+    assert {path: (out / path).read_bytes() for path in files(out)} == before
+
+
+def test_labels_are_written_last_so_that_half_a_prediction_is_none(reader, tmp_path, monkeypatch):
+    out, frames = tmp_path / "out", reader.frames("val")
+
+    def full(*_):
+        raise OSError("no space left on device")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(predicting, "write_labels", full)
+        with pytest.raises(OSError, match="no space"):
+            write_all(reader, frames, out)
+    assert files(out) == ["sequences/08/detections/000000.npz"]
+    assert unfinished(reader, frames, out) == frames
+    with monkeypatch.context() as broken:
+        broken.setattr("most.files.os.fsync", full)  # within a write: the file is there, but not whole
+        with pytest.raises(OSError, match="no space"):
+            write_prediction(PREDICTION, reader.prediction_path(out, frames[1]), TAXONOMY)
+    assert files(out) == ["sequences/08/detections/000000.npz"]
+
+
+@pytest.fixture
+def checkpoint(tmp_path):
+    path = tmp_path / "last.ckpt"
+    path.write_bytes(b"weights")
+    return path
+
+
+def test_the_same_prediction_goes_on_in_its_folder(tmp_path, checkpoint, reader):
+    out = tmp_path / "deep" / "out"
+    for _ in range(2):
+        claim_folder(out, checkpoint, reader, "val")
+    assert files(out) == ["prediction.json"]
+    moved = checkpoint.rename(tmp_path / "renamed.ckpt")  # it is the content that counts
+    claim_folder(out, moved, SemanticKITTI(reader.root, reader.splits), "val")
+
+
+def test_another_checkpoint_split_or_dataset_is_refused(tmp_path, checkpoint, reader):
+    out = tmp_path / "out"
+    claim_folder(out, checkpoint, reader, "val")
+    write_sequence(tmp_path / "elsewhere", "08", range(1))
+    others = {
+        "split": (SemanticKITTI(reader.root, Splits(val=["08"], test=["08"])), "test"),
+        "tree": (SemanticKITTI(tmp_path / "elsewhere", reader.splits), "val"),
+    }
+    for other in others.values():
+        with pytest.raises(DataError, match="holds predictions of another checkpoint, dataset or split; choose anot"):
+            claim_folder(out, checkpoint, *other)
+    checkpoint.write_bytes(b"other weights")
+    with pytest.raises(DataError, match="holds predictions of another checkpoint"):
+        claim_folder(out, checkpoint, reader, "val")
+
+
+def test_a_folder_with_other_files_is_refused_untouched(tmp_path, checkpoint, reader):
+    out = tmp_path / "out"
+    out.mkdir()
+    claim_folder(out, checkpoint, reader, "val")  # an empty one will do
+    (out / "prediction.json").rename(out / "thesis.txt")
+    with pytest.raises(DataError, match="expected a new or empty folder, found other files; choose another out"):
+        claim_folder(out, checkpoint, reader, "val")
+    assert files(out) == ["thesis.txt"]
+
+
+def test_a_file_in_the_folders_place_is_refused(checkpoint, reader):
+    with pytest.raises(DataError, match=r"last\.ckpt: expected a new or empty folder, found a file; choose another"):
+        claim_folder(checkpoint, checkpoint, reader, "val")
+
+
+@pytest.mark.parametrize("content", [b"", b"[]", b"{", b"\xff"])
+def test_a_record_of_another_program_is_refused(tmp_path, checkpoint, reader, content):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "prediction.json").write_bytes(content)
+    with pytest.raises(DataError, match="choose another out"):
+        claim_folder(out, checkpoint, reader, "val")
