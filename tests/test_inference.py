@@ -84,7 +84,7 @@ def test_non_finite_points_read_the_voxel_nearest_to_the_middle(strange):
     assert semantics([0.0, -7.0, 0.0], [0.0, 1.0, 0.0], [strange, strange, strange])[2] == CAR
 
 
-def test_the_voxels_of_another_window_or_class_of_its_points_do_not_matter():
+def test_points_out_of_range_do_not_read_voxels_of_another_window():
     left, right = torch.tensor([[0.0, 7.0, 0.0], [0.0, -90.0, 0.0]]), torch.tensor([[0.0, 90.0, 0.0], [0.0, -7.0, 0.0]])
     first, second = known()([window(left, cloud(3)), window(right)])
     assert first.panoptic.semantics[0] == CAR
