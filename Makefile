@@ -28,7 +28,7 @@ demo: setup
 	$(RUN) -m most.evaluate predictions=$(DEMO)/predictions split=test out=$(DEMO)/metrics.json \
 	  dataset=simulated dataset.root=$(DEMO)/streets
 	$(RUN) -m most.draw predictions=$(DEMO)/predictions sequence="'10'" index=5 out=$(DEMO)/sweep.png \
-	  dataset=simulated dataset.root=$(DEMO)/streets dataset.tables=$(DEMO)/tables
+	  dataset=simulated dataset.root=$(DEMO)/streets
 	@echo "table: above and in $(DEMO)/metrics.json; picture: $(DEMO)/sweep.png"
 
 # Real scans, where there are any: MOST_REAL_DATA=FOLDER make test (FOLDER holds semantickitti/sequences/NN).

@@ -1,6 +1,7 @@
 """Draw a predicted sweep: ``python -m most.draw predictions=FOLDER sequence=08 index=4 out=sweep.png``."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +10,14 @@ from omegaconf import MISSING, DictConfig
 
 from most.config import conf_dir, register, store_root, typed
 from most.datasets.dataset import WindowDataset
-from most.datasets.instances import InstanceTables
-from most.datasets.reader import Frame
+from most.datasets.reader import Frame, Reader
 from most.datasets.semantickitti import SemanticKITTI
 from most.entry import run
-from most.modal.extent import TrackMax
+from most.geometry.similarity import Similarity
+from most.modal.build import LabelRules, build_table
+from most.modal.extent import ShrinkWrap
 from most.predicting import read_prediction
+from most.structures import Instances
 from most.viz.bev import save
 from most.viz.callback import draw_prediction
 
@@ -39,9 +42,16 @@ def draw(config: DrawConfig) -> None:
     reader = SemanticKITTI(config.dataset.root, config.dataset.splits)
     frame = Frame(config.sequence, config.index)
     prediction = read_prediction(reader.prediction_path(Path(config.predictions), frame), reader.taxonomy)
-    instances = InstanceTables(reader, TrackMax(), config.dataset.tables)
-    sample = WindowDataset(reader, [frame], previous=0, instances=instances)[0]
+    sample = WindowDataset(reader, [frame], previous=0, instances=partial(instances_of_one, reader))[0]
     save(draw_prediction(sample, prediction, reader.taxonomy), Path(config.out))
+
+
+def instances_of_one(reader: Reader, frame: Frame, change: Similarity) -> Instances:
+    """The instances of one sweep as it shows them: shrink-wrapped, motion unknown; no table of its sequence is made."""
+    taxonomy = reader.taxonomy
+    rules = LabelRules(taxonomy.to_training, taxonomy.is_thing, taxonomy.instance_of)
+    table = build_table([reader.sweep(frame)], rules)
+    return table.instances(frame.index, ShrinkWrap(), change.linear, change.translation)
 
 
 @hydra.main(version_base=None, config_path=str(conf_dir()), config_name="draw")

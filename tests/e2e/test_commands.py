@@ -93,7 +93,7 @@ def test_predictions_cover_every_point_and_are_scored(run):
         assert scores[name] == (trained[name] and pytest.approx(trained[name], abs=1e-6)), name
 
     done = most(run, "draw", "predictions=predictions", "sequence='01'", "index=1", "out=sweep.png",
-                "dataset=simulated", "dataset.root=streets", "dataset.tables=tables", *SPLITS)  # fmt: skip
+                "dataset=simulated", "dataset.root=streets", *SPLITS)  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert (run / "sweep.png").read_bytes().startswith(b"\x89PNG")
 

@@ -8,7 +8,8 @@ import torch
 from jaxtyping import Bool, Float64, Int64
 from torch import Tensor
 
-from most.modal.instances import InstanceTable, turn, yaw
+from most.geometry.poses import yaw
+from most.modal.instances import InstanceTable, turn
 from most.modal.outline import hull, join, merge
 from most.structures import Sweep
 
@@ -101,7 +102,7 @@ def _measure(sweep: Sweep, labels: Int64[Tensor, "points"], rules: LabelRules) -
     centres = points.new_zeros(len(keys), 3).index_add_(0, owners, points) / counts[:, None]
     pose = sweep.pose.double()
     about = points - centres[owners]
-    flat = (about[:, :2] @ turn(yaw(pose[:3, :3])).T).numpy()
+    flat = (about[:, :2] @ turn(yaw(pose)).T).numpy()
     groups = np.split(np.argsort(owners.numpy(), kind="stable"), torch.cumsum(counts, 0)[:-1].numpy())[: len(keys)]
     return _Frame(
         index=sweep.index,

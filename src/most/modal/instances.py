@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float64, Int64
 from torch import Tensor
 
 from most.errors import DataError
+from most.geometry.poses import yaw
 from most.modal.outline import Outlines
 from most.structures import Instances
 
@@ -71,7 +72,7 @@ class InstanceTable:
             raise DataError(f"instance table: expected a labelled sweep {index}, found none among {len(self.frames)}")
         rows = torch.arange(int(self.starts[frame]), int(self.starts[frame + 1]))
         rotation = self.poses[frame, :3, :3]
-        planar = linear[:2, :2] @ turn(-yaw(rotation))
+        planar = linear[:2, :2] @ turn(-yaw(self.poses[frame]))
         velocities = self.world_velocities[rows] @ rotation @ linear.T
         return Instances(
             keys=self.keys[rows],
@@ -82,11 +83,6 @@ class InstanceTable:
             velocities=velocities[:, :2].float(),
             velocity_known=self.velocity_known[rows],
         )
-
-
-def yaw(rotation: Float64[Tensor, "3 3"]) -> Float64[Tensor, ""]:
-    """Return the heading of the rotated x axis about z, radians."""
-    return torch.atan2(rotation[1, 0], rotation[0, 0])
 
 
 def turn(angle: Float64[Tensor, ""]) -> Float64[Tensor, "2 2"]:
