@@ -47,7 +47,8 @@ def cached_table(
     made_from = f"{made_from} max_gap={rules.max_gap}"
     table = load(path, made_from)
     if table is None:
-        table = build_table(tqdm(sweeps, f"instances of {path.stem}", num_sweeps, unit="sweep", leave=False), rules)
+        progress = tqdm(sweeps, f"instances of {path.stem}", num_sweeps, unit="sweep", leave=False)
+        table = build_table(iter(progress), rules)
         save(table, path, made_from)
     return table
 

@@ -88,7 +88,7 @@ def box(low: Vector, high: Vector, surface: Surface) -> Mesh:
     """A box along the axes between two corners."""
     (x0, y0, z0), (x1, y1, z1) = low, high
     ring = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
-    return loft(np.array([[(x, y, z) for x, y in ring] for z in (z0, z1)]), surface)
+    return loft(np.array([[(x, y, z) for x, y in ring] for z in (z0, z1)], float), surface)
 
 
 @cache

@@ -60,7 +60,7 @@ class Street:
         line = np.cumsum(_STEP * np.stack([np.cos(heading), np.sin(heading)], 1), 0)
         self._line = line - line[np.searchsorted(self._s, 0.0)]
 
-    def heading(self, s: Float[np.ndarray, "*n"] | float) -> Float[np.ndarray, "*n"]:
+    def heading(self, s: Float[np.ndarray, "*n"] | float) -> Float[np.ndarray, "*n"] | float:
         """Direction of the centre line, radians in the world frame."""
         waves = [a * (np.sin(2 * np.pi * np.asarray(s) / length + p) - np.sin(p)) for a, length, p in self._bends]
         return np.sum(waves, axis=0)
@@ -71,7 +71,7 @@ class Street:
         centre = np.stack([np.interp(s, self._s, self._line[:, k]) for k in (0, 1)], -1)
         return centre + np.asarray(d)[..., None] * np.stack([-np.sin(heading), np.cos(heading)], -1)
 
-    def hills(self, xy: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n"]:
+    def hills(self, xy: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n"] | float:
         """Height of the undulating land the street is laid on, m."""
         waves = [
             a * (np.sin(2 * np.pi * (xy[..., 0] * np.cos(w) + xy[..., 1] * np.sin(w)) / length + p) - np.sin(p))
