@@ -3,7 +3,6 @@ from pathlib import Path
 
 import pytest
 import torch
-from semantickitti_tree import CAR, PARKED
 from torch import Tensor
 from torch.utils.data import DataLoader
 
@@ -17,6 +16,7 @@ from most.geometry.poses import relative, transform
 from most.geometry.similarity import Similarity
 from most.modal.extent import ShrinkWrap, TrackMax
 from most.structures import Instances, Sample
+from semantickitti_tree import CAR, PARKED
 
 AUGMENT = Augment(flip_x=True, flip_y=True, rotation=45.0, scale=[0.9, 1.1], translation=0.5)
 FLOOR = 1e-3  # m; below every size in the tree that is not 0

@@ -6,11 +6,11 @@ import pytest
 import torch
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from omegaconf import OmegaConf
-from semantickitti_tree import CAR, lidar_pose
 
 from most.datasets.reader import Frame
 from most.datasets.semantickitti import SemanticKITTI, Splits
 from most.errors import ConfigError, DataError
+from semantickitti_tree import CAR, lidar_pose
 
 
 def test_official_splits() -> None:
