@@ -25,7 +25,8 @@ def train(config: Config, folder: Path) -> None:
     if config.trainer.threads:
         torch.set_num_threads(config.trainer.threads)
     data = SemanticKITTIDataModule(config.dataset, config.augment, config.extent, config.seed)
-    data.reader.sequences("train"), data.reader.sequences("val")  # what is missing is missed before any work
+    for split in ("train", "val"):
+        data.reader.sequences(split)  # raises where the dataset is not there, before any work
     if config.resume:
         check_resume(config, data.reader.taxonomy)
     try:

@@ -32,7 +32,7 @@ class DetectionTraining:
     warm_up: float = 0.4  # share of the steps in which the rate rises (one-cycle)
     initial_divisor: float = 10.0  # the rate starts at max_lr / initial_divisor
     clip: float = 35.0  # norm of the gradient
-    batch_size: int = 8  # effective: scans an optimiser step, over all processes and accumulated batches
+    batch_size: int = 8  # effective: scans an optimiser step, over all accumulated batches
     epochs: int = 20
     targets: HeatmapTargets = field(default_factory=HeatmapTargets)
     losses: LossWeights = field(default_factory=LossWeights)
