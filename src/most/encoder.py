@@ -1,5 +1,6 @@
 """The shared point MLP and the mean of its output in each voxel (paper, section III, overview; Fig. 2)."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import torch
@@ -8,6 +9,7 @@ from torch import Tensor, nn
 
 from most.errors import ConfigError
 from most.normed_linear import NormedLinear
+from most.normed_pair import NormedPair
 from most.structures import Voxels
 from most.voxels import Grid
 
@@ -36,8 +38,7 @@ class PointMLP(nn.Module):
     def __init__(self, widths: list[int], grid: Grid) -> None:
         super().__init__()
         self.grid = grid
-        widths_in = [POINT_CHANNELS, *widths[:-1]]
-        self.layers = nn.Sequential(*(NormedLinear(*width) for width in zip(widths_in, widths, strict=True)))
+        self.layers = nn.Sequential(*normed_layers([POINT_CHANNELS, *widths]))
         self.point_channels = widths[-1]
         self.voxel_channels = widths[-1] + VOXEL_CHANNELS
 
@@ -48,6 +49,17 @@ class PointMLP(nn.Module):
         described, raw = describe(points, voxels, self.grid)
         features = self.layers(described)
         return features, torch.cat([voxel_mean(features, voxels), raw], 1)
+
+
+def normed_layers(widths: list[int]) -> Iterator[nn.Module]:
+    """Yield the layers between these widths; a layer that narrows to less than a half is paired with the one before."""
+    while len(widths) > 1:
+        if len(widths) > 2 and 2 * widths[2] < widths[1]:
+            yield NormedPair(*widths[:3])
+            widths = widths[2:]
+        else:
+            yield NormedLinear(*widths[:2])
+            widths = widths[1:]
 
 
 def voxel_mean(values: Float[Tensor, "inputs channels"], voxels: Voxels) -> Float[Tensor, "voxels channels"]:

@@ -9,6 +9,7 @@ from most.config import conf_dir, register, typed
 from most.datasets.taxonomy import Taxonomy
 from most.membership import Nearest
 from most.modal.extent import TrackMax
+from most.normed_linear import NormedLinear
 from most.sparse import InverseConv, StridedConv, SubmanifoldConv
 from most.stages.detection import one_cycle
 
@@ -43,7 +44,8 @@ def test_eleven_sweeps_of_the_official_split():
 def test_augmentation_and_extents():
     augment = recipe().augment
     assert (augment.flip_x, augment.flip_y) == (True, True)
-    assert (augment.rotation, list(augment.scale), augment.translation) == (45.0, [0.9, 1.1], 0.5)
+    assert (augment.rotation, list(augment.scale), list(augment.translation)) == (45.0, [0.9, 1.1], [0.5] * 3)
+    assert (augment.intensity, augment.half_swap) == (0, 0)
     assert recipe().extent == TrackMax(floor=0.05)
     assert recipe().membership == Nearest()
 
@@ -77,7 +79,8 @@ def test_inference():
 
 
 def test_point_mlp_widths():
-    assert [layer.linear.out_features for layer in network().encoder.layers] == [64, 128, 256, 32]
+    layers = [module for module in network().encoder.modules() if isinstance(module, NormedLinear)]
+    assert [layer.linear.out_features for layer in layers] == [64, 128, 256, 32]
 
 
 def test_backbone_widths_and_kernels():
