@@ -47,12 +47,20 @@ def test_flips_mirror_the_named_axis_half_of_the_time() -> None:
 
 def test_translation_has_the_named_deviation() -> None:
     rng = np.random.default_rng(0)
-    moves = torch.stack([Augment(translation=0.5).transform(rng).translation for _ in range(500)])
-    assert 0.4 < float(moves.std()) < 0.6
+    moves = torch.stack([Augment(translation=[0.5, 0.2, 0.0]).transform(rng).translation for _ in range(500)])
+    torch.testing.assert_close(moves.std(0), torch.tensor([0.5, 0.2, 0.0]).double(), rtol=0.1, atol=0)
+
+
+def test_intensities_rise_and_fall_within_their_share() -> None:
+    rng = np.random.default_rng(0)
+    factors = [Augment(intensity=0.1).brightness(rng) for _ in range(200)]
+    assert 0.9 <= min(factors) < 0.92
+    assert 1.08 < max(factors) <= 1.1
+    assert Augment().brightness(rng) == 1.0
 
 
 def test_same_generator_same_transform() -> None:
-    augment = Augment(True, True, 45.0, [0.9, 1.1], 0.5)
+    augment = Augment(True, True, 45.0, [0.9, 1.1], [0.5, 0.5, 0.5])
     one, other = (augment.transform(np.random.default_rng([1, 2, 3])) for _ in range(2))
     assert torch.equal(one.linear, other.linear)
     assert torch.equal(one.translation, other.translation)
@@ -66,8 +74,14 @@ def test_same_generator_same_transform() -> None:
         ({"scale": [1.0]}, r"augment\.scale: expected \[lowest, highest\], both above 0, found \[1\.0\]"),
         ({"scale": [1.1, 0.9]}, r"augment\.scale"),
         ({"scale": [0.0, 1.0]}, r"augment\.scale"),
-        ({"translation": -0.1}, r"augment\.translation: expected metres >= 0, found -0\.1"),
-        ({"translation": math.nan}, r"augment\.translation"),
+        (
+            {"translation": [0.0, -0.1, 0.0]},
+            r"augment\.translation: expected \[x, y, z\] in metres >= 0, found \[0\.0, -0\.1, 0\.0\]",
+        ),
+        ({"translation": [0.0, 0.0, math.nan]}, r"augment\.translation"),
+        ({"translation": [0.1, 0.1]}, r"augment\.translation"),
+        ({"intensity": -0.1}, r"augment\.intensity: expected a share in 0\.\.1, found -0\.1"),
+        ({"half_swap": 1.5}, r"augment\.half_swap: expected a share in 0\.\.1, found 1\.5"),
     ],
 )
 def test_faulty_settings_are_refused(settings: dict, message: str) -> None:

@@ -18,7 +18,7 @@ from most.modal.extent import ShrinkWrap, TrackMax
 from most.structures import Instances, Sample
 from semantickitti_tree import CAR, PARKED
 
-AUGMENT = Augment(flip_x=True, flip_y=True, rotation=45.0, scale=[0.9, 1.1], translation=0.5)
+AUGMENT = Augment(flip_x=True, flip_y=True, rotation=45.0, scale=[0.9, 1.1], translation=[0.5, 0.5, 0.5])
 FLOOR = 1e-3  # m; below every size in the tree that is not 0
 
 

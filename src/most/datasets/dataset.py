@@ -1,5 +1,6 @@
 """Samples by index: reads a window of sweeps, augments it, and adds the truth of the current sweep."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -7,6 +8,7 @@ import torch
 from torch.utils.data import Dataset
 
 from most.datasets.augment import Augment
+from most.datasets.half_swap import swap_half
 from most.datasets.reader import Frame, Reader
 from most.datasets.windows import gather_window, previous_frames
 from most.geometry.similarity import Similarity
@@ -50,12 +52,20 @@ class WindowDataset(Dataset[Sample]):
         self.epoch.fill_(epoch)
 
     def __getitem__(self, index: int) -> Sample:
-        frame = self.frames[index]
+        rng = np.random.default_rng([self.seed, int(self.epoch), index])
+        sample = self._window(self.frames[index], rng)
+        if self.augment.swaps(rng):
+            other = self._window(self.frames[rng.integers(len(self))], rng)
+            sample = swap_half(sample, other, rng.uniform(-math.pi, math.pi))
+        return sample
+
+    def _window(self, frame: Frame, rng: np.random.Generator) -> Sample:
         current = self.sweep(frame)
         before = previous_frames(self.neighbours[frame.sequence], frame, self.previous)
         points = gather_window(current, [self.sweep(other) for other in before])
-        change = self.augment.transform(np.random.default_rng([self.seed, int(self.epoch), index]))
+        change = self.augment.transform(rng)
         points[:, :3] = change.apply(points[:, :3])
+        points[:, 3] *= self.augment.brightness(rng)
         labels = current.labels
         return Sample(
             sequence=frame.sequence,
