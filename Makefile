@@ -17,19 +17,22 @@ $(READY): pyproject.toml
 	$(RUN) -m pip install --quiet --editable '.[dev]'
 	touch $(READY)
 
-# Simulate streets, train on some, label others, score them, draw one.
+STREETS = dataset=simulated dataset.root=$(DEMO)/streets
+MODEL = $(DEMO)/run/checkpoints/membership-last.ckpt
+
+# Simulate streets, train both stages on some, label others in two ways, score them, draw one.
 demo: setup
-	rm -rf $(DEMO)/run $(DEMO)/predictions
+	rm -rf $(DEMO)/run $(DEMO)/full $(DEMO)/nearest
 	$(RUN) -m most.simulate simulation=demo out=$(DEMO)/streets
 	$(RUN) -m most.train +experiment=sim_demo dataset.root=$(DEMO)/streets dataset.tables=$(DEMO)/tables \
 	  hydra.run.dir=$(DEMO)/run
-	$(RUN) -m most.predict checkpoint=$(DEMO)/run/checkpoints/last.ckpt split=test out=$(DEMO)/predictions \
-	  dataset=simulated dataset.root=$(DEMO)/streets
-	$(RUN) -m most.evaluate predictions=$(DEMO)/predictions split=test out=$(DEMO)/metrics.json \
-	  dataset=simulated dataset.root=$(DEMO)/streets
-	$(RUN) -m most.draw predictions=$(DEMO)/predictions sequence="'10'" index=5 out=$(DEMO)/sweep.png \
-	  dataset=simulated dataset.root=$(DEMO)/streets
-	@echo "table: above and in $(DEMO)/metrics.json; picture: $(DEMO)/sweep.png"
+	$(RUN) -m most.predict checkpoint=$(MODEL) split=test out=$(DEMO)/nearest membership=nearest $(STREETS)
+	$(RUN) -m most.predict checkpoint=$(MODEL) split=test out=$(DEMO)/full $(STREETS)
+	$(RUN) -m most.evaluate predictions=$(DEMO)/nearest split=test out=$(DEMO)/nearest.json $(STREETS)
+	$(RUN) -m most.evaluate predictions=$(DEMO)/full split=test out=$(DEMO)/metrics.json $(STREETS)
+	$(RUN) -m most.draw predictions=$(DEMO)/full sequence="'10'" index=5 out=$(DEMO)/sweep.png $(STREETS)
+	$(RUN) -m most.compare 'reports={nearest: $(DEMO)/nearest.json, full: $(DEMO)/metrics.json}'
+	@echo "tables: above, in $(DEMO)/metrics.json and $(DEMO)/nearest.json; picture: $(DEMO)/sweep.png"
 
 # Real scans, where there are any: MOST_REAL_DATA=FOLDER make test (FOLDER holds semantickitti/sequences/NN).
 test: setup

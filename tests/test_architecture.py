@@ -6,26 +6,27 @@ from pathlib import Path
 import most
 
 ROOT = Path(most.__file__).parent
-FOUNDATION = {"structures", "errors", "files", "geometry"}
+FOUNDATION = {"structures", "errors", "files", "processes", "geometry"}
 COMPONENTS = {
     "datasets": {"modal"},
     "modal": set(),
     "sparse": set(),
     "voxels": set(),
+    "norm": set(),
     "normed_linear": set(),
-    "normed_pair": {"normed_linear"},
+    "normed_pair": {"norm", "normed_linear"},
     "encoder": {"voxels", "normed_linear", "normed_pair"},
-    "backbones": {"sparse"},
-    "heads": set(),
+    "backbones": {"norm", "sparse"},
+    "heads": {"norm"},
     "losses": {"modal"},
     "detections": {"voxels"},
-    "membership": set(),
+    "membership": {"voxels", "normed_linear"},
     "panoptic": {"membership"},
-    "metrics": set(),
+    "metrics": {"membership"},
     "simulation": {"datasets"},
 }
-ENTRY_POINTS = {"train", "predict", "evaluate", "simulate", "draw"}
-OUTER = {"entry", "config", "assembly", "training"}
+ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw"}
+OUTER = {"entry", "config", "assembly", "training", "resuming"}
 
 
 def imported(path):

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from most.errors import ConfigError
-from most.losses import LossWeights, class_weights, focal_loss, regression_losses, semantic_loss
+from most.losses import LossWeights, class_weights, focal_loss, lovasz_loss, regression_losses, semantic_loss
 from most.modal.targets import BevTargets
 from most.structures import BevMaps
 
@@ -73,3 +73,25 @@ def test_no_instances_no_regression():
 def test_negative_weights_are_refused():
     with pytest.raises(ConfigError, match=r"losses\.extent: expected a number >= 0, found -1"):
         LossWeights(extent=-1.0)
+
+
+def test_lovasz_of_certain_answers_is_one_minus_mean_iou():
+    """Classes 1 2 3 are present, with IoU 1/3, 2/4 and 1; an answer at a void item costs nothing."""
+    truth, said = torch.tensor([1, 1, 2, 2, 2, 3, 0]), torch.tensor([1, 2, 2, 2, 1, 3, 1])
+    logits = torch.nn.functional.one_hot(said - 1, 4) * 1000.0
+    torch.testing.assert_close(lovasz_loss(logits, truth), torch.tensor(1 - (1 / 3 + 2 / 4 + 1) / 3))
+
+
+def test_lovasz_falls_on_the_way_to_the_truth():
+    truth, logits = torch.tensor([1, 1, 2]), torch.zeros(3, 2, dtype=torch.float64, requires_grad=True)
+    (gradient,) = torch.autograd.grad(lovasz_loss(logits, truth), logits)
+    assert (gradient[[0, 1, 2], [0, 0, 1]] < 0).all()
+    assert lovasz_loss(logits - gradient, truth) < lovasz_loss(logits, truth)
+
+
+def test_lovasz_without_a_known_item_is_nothing():
+    logits = torch.zeros(3, 2, requires_grad=True)
+    loss = lovasz_loss(logits, torch.zeros(3, dtype=torch.long))
+    loss.backward()
+    assert loss == 0
+    assert (logits.grad == 0).all()

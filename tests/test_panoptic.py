@@ -1,8 +1,9 @@
 import torch
 
-from most.membership import Nearest, RegionOfInterest
+from most.membership import Evidence, Nearest, RegionOfInterest
 from most.panoptic import Fusion, cluster, fuse
 from most.structures import Detections
+from most.voxels import BevGrid
 
 THINGS = [1, 2]
 
@@ -16,10 +17,14 @@ def detections(centres, classes, extent=1.0):
 
 
 def label(points, semantics, found, membership=None, roi=None, **fusion):
-    return fuse(
-        torch.tensor(points), torch.tensor(semantics), THINGS, found, membership or Nearest(),
-        roi or RegionOfInterest(margin=1.0, slack=0.0), Fusion(**fusion),
+    nothing = torch.zeros(len(points), 0)
+    evidence = Evidence(
+        torch.tensor(points), torch.tensor(semantics), nothing, nothing, torch.zeros(0, 4, 4),
+        BevGrid((0.0, 0.0), (1.0, 1.0), (4, 4)), found,
     )  # fmt: skip
+    return fuse(
+        evidence, THINGS, membership or Nearest(), roi or RegionOfInterest(margin=1.0, slack=0.0), Fusion(**fusion)
+    )
 
 
 class Rated:
@@ -28,7 +33,7 @@ class Rated:
     def __init__(self, table):
         self.table = table
 
-    def __call__(self, points, pairs, detections):
+    def __call__(self, evidence, pairs):
         rows = zip(pairs.points.tolist(), pairs.detections.tolist(), strict=True)
         return torch.tensor([self.table[row] for row in rows])
 

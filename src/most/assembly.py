@@ -11,7 +11,9 @@ from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError, DataError
 from most.heads import CentreHead, SemanticHead
 from most.inference import Predictor
+from most.membership import Channels
 from most.network import Network
+from most.panoptic import Membership
 from most.voxels import Grid
 
 FORMAT = 1
@@ -36,9 +38,17 @@ def build_network(parts: dict[str, Any], taxonomy: Taxonomy) -> Network:
     )
 
 
+def build_membership(parts: dict[str, Any], network: Network, taxonomy: Taxonomy) -> Membership:
+    """Make the membership that goes with a network."""
+    point, bev = network.encoder.point_channels, network.backbone.bev_channels
+    made: Membership = parts["membership"].build(Channels(taxonomy.num_classes - 1, list(taxonomy.things), point, bev))
+    return made
+
+
 def build_predictor(network: Network, parts: dict[str, Any], taxonomy: Taxonomy) -> Predictor:
     """Join a network with what comes after it."""
-    return Predictor(network, list(taxonomy.things), taxonomy.stuff[0], parts["membership"], parts["inference"])
+    membership = build_membership(parts, network, taxonomy)
+    return Predictor(network, list(taxonomy.things), taxonomy.stuff[0], membership, parts["inference"])
 
 
 def model_parts(config: Config) -> dict[str, Any]:
@@ -96,11 +106,12 @@ def _assemble(description: dict[str, Any], state: dict[str, Any]) -> Trained:
     if describe_taxonomy(taxonomy) != description["taxonomy"]:
         raise ConfigError(f"taxonomy {taxonomy.name}: expected its classes and things, found others")
     parts = {group: from_plain(group, description["parts"][group]) for group in GROUPS}
-    network = build_network(parts, taxonomy)
-    prefix = "network."
-    network.load_state_dict({key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)})
-    network.eval()
-    return Trained(build_predictor(network, parts, taxonomy), taxonomy, description["sweeps"])
+    predictor = build_predictor(build_network(parts, taxonomy), parts, taxonomy)
+    for name, module in predictor.modules().items():
+        prefix = f"{name}."
+        module.load_state_dict({key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)})
+        module.eval()
+    return Trained(predictor, taxonomy, description["sweeps"])
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:

@@ -22,9 +22,9 @@ from most.errors import ConfigError
 from most.heads import CentreHead, SemanticHead
 from most.inference import Inference
 from most.logs import LoggerSettings
-from most.membership import Nearest
+from most.membership import Nearest, PointSegMLPSettings
 from most.modal.extent import ShrinkWrap, TrackMax
-from most.stages.detection import DetectionTraining
+from most.stages.settings import StageSettings
 from most.stages.trainer import TrainerSettings
 from most.voxels import Grid
 
@@ -39,8 +39,8 @@ COMPONENTS: dict[str, dict[str, type]] = {
         "asymmetric_unet_small": AsymmetricUNetSmallSettings,
         "residual_unet": ResidualUNetSettings,
     },
-    "membership": {"nearest": Nearest},
-    "stage": {"detection": DetectionTraining},
+    "membership": {"nearest": Nearest, "point_seg_mlp": PointSegMLPSettings},
+    "stage": {"stage": StageSettings},
     "trainer": {"trainer": TrainerSettings},
     "logger": {"logger": LoggerSettings},
     "centre_head": {"centre_head": CentreHead},
@@ -71,6 +71,7 @@ class Config:
     name: str = "most"
     seed: int = 1
     resume: str | None = None  # a checkpoint to go on from
+    stage1: str | None = None  # the trained stage 1 for stage=membership
     dataset: Any = None
     augment: Any = None
     extent: Any = None

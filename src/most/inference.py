@@ -3,11 +3,12 @@
 from dataclasses import dataclass, field
 
 import torch
+import torch.nn.functional as F
 from jaxtyping import Float, Int64
-from torch import Tensor
+from torch import Tensor, nn
 
 from most.detections import PeakDetector
-from most.membership import RegionOfInterest
+from most.membership import Evidence, RegionOfInterest
 from most.network import Network, NetworkOutput
 from most.panoptic import Fusion, Membership, fuse
 from most.structures import Detections, OnDevice, Panoptic, Sample
@@ -43,37 +44,71 @@ class Predictor:
     membership: Membership
     settings: Inference
 
+    def modules(self) -> dict[str, nn.Module]:
+        """What of this has weights, by the name it has in checkpoints."""
+        parts = {"network": self.network, "membership": self.membership}
+        return {name: part for name, part in parts.items() if isinstance(part, nn.Module)}
+
     def __call__(self, samples: list[Sample]) -> list[Prediction]:
         """Label every point of the current sweeps."""
+        return [self.fuse(evidence) for evidence in self.see(samples)]
+
+    def see(self, samples: list[Sample]) -> list[Evidence]:
+        """Return what stage 1 says of each current sweep, up to the detections."""
         output = self.network(samples)
         found = self.settings.detector(output.maps, self.things, self.network.bev_grid)
         classified = classify(output, samples, self.network.grid, self.fallback)
-        return [self._fuse(*each) for each in zip(samples, classified, found, strict=True)]
+        return [
+            Evidence(
+                points=sample.points[: sample.num_current, :3],
+                semantics=seen.semantics,
+                probabilities=seen.probabilities,
+                point_features=seen.point_features,
+                bev=bev,
+                bev_grid=self.network.bev_grid,
+                detections=detections,
+            )
+            for sample, seen, bev, detections in zip(samples, classified, output.bev, found, strict=True)
+        ]
 
-    def _fuse(self, sample: Sample, semantics: Int64[Tensor, "current"], detections: Detections) -> Prediction:
-        points, roi = sample.points[: sample.num_current, :3], self.settings.roi
-        assignment = fuse(points, semantics, self.things, detections, self.membership, roi, self.settings.fusion)
+    def fuse(self, evidence: Evidence) -> Prediction:
+        """Return the labels of one sweep."""
+        roi, detections = self.settings.roi, evidence.detections
+        assignment = fuse(evidence, self.things, self.membership, roi, self.settings.fusion)
         return Prediction(assignment.panoptic, detections, roi.half_sizes(detections.extents), assignment.claimed)
 
 
-def classify(output: NetworkOutput, samples: list[Sample], grid: Grid, fallback: int) -> list[Int64[Tensor, "current"]]:
-    """Return the class of every point of each current sweep; points out of range read the nearest voxel's."""
+@dataclass
+class Classified:
+    """The points of one current sweep as the network classified them."""
+
+    semantics: Int64[Tensor, "current"]
+    probabilities: Float[Tensor, "current classes"]
+    point_features: Float[Tensor, "current point_channels"]
+
+
+def classify(output: NetworkOutput, samples: list[Sample], grid: Grid, fallback: int) -> list[Classified]:
+    """Return what each point of the current sweeps is; points out of range read the nearest voxel's class."""
     where = output.voxels.inputs[output.current]
-    point_classes, voxel_classes = output.point_logits.argmax(1) + 1, output.voxel_logits.argmax(1) + 1
+    voxel_classes = output.voxel_logits.argmax(1) + 1
     supervised = torch.zeros(len(output.voxels), dtype=torch.bool, device=where.device)
     supervised[output.voxels.point_voxel[output.current]] = True  # the loss reaches no voxel of past sweeps alone
     start, results = 0, []  # where the window's points begin among the batch's
     for index, sample in enumerate(samples):
         first, last = torch.searchsorted(where, torch.tensor([start, start + sample.num_current], device=where.device))
+        inside, rows = where[first:last] - start, slice(int(first), int(last))
         semantics = torch.full((sample.num_current,), fallback, dtype=torch.long, device=where.device)
-        outside = torch.ones(sample.num_current, dtype=torch.bool, device=where.device)
-        semantics[where[first:last] - start] = point_classes[first:last]
-        outside[where[first:last] - start] = False
+        semantics[inside] = output.point_logits[rows].argmax(1) + 1
+        outside = torch.ones_like(semantics, dtype=torch.bool).index_fill_(0, inside, value=False)
         mine = (output.voxels.coordinates[:, 0] == index) & supervised
         if outside.any() and mine.any():
             points = sample.points[: sample.num_current][outside]
             nearest = nearest_voxel(points, output.voxels.coordinates[mine, 1:], grid)
             semantics[outside] = voxel_classes[mine][nearest]
-        results.append(semantics)
+        probabilities = F.one_hot(semantics - 1, output.point_logits.shape[1]).float()
+        probabilities[inside] = output.point_logits[rows].float().softmax(1)
+        features = output.point_features.new_zeros(len(semantics), output.point_features.shape[1])
+        features[inside] = output.point_features[output.current[rows]]
+        results.append(Classified(semantics, probabilities, features))
         start += len(sample.points)
     return results

@@ -9,6 +9,7 @@ from torch.nn import functional as F
 
 from most.errors import ConfigError
 from most.modal.targets import BevTargets
+from most.processes import mean_over_all
 from most.structures import BevMaps
 
 EPSILON = 1e-4  # probabilities are kept this far from 0 and 1
@@ -25,12 +26,13 @@ class LossWeights:
     height: float = 1.0
     extent: float = 1.0
     velocity: float = 1.0
+    lovasz: float = 0.0  # on voxels; not the paper's
     class_balance: float = 0.0  # cross-entropy weights are (class frequency) ** -class_balance
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if value < 0:
-                raise ConfigError(f"stage.losses.{name}: expected a number >= 0, found {value}")
+                raise ConfigError(f"stage.detection.losses.{name}: expected a number >= 0, found {value}")
 
 
 def class_weights(counts: Int64[Tensor, "classes"], class_balance: float) -> Float[Tensor, "classes"]:
@@ -45,7 +47,27 @@ def semantic_loss(
 ) -> Float[Tensor, ""]:
     """Cross-entropy, averaged over the items that are not void (Eq. 1); ``semantics`` are training ids."""
     total = F.cross_entropy(logits.float(), semantics - 1, weights, ignore_index=-1, reduction="sum")
-    return total / weights[(semantics[semantics > 0] - 1)].sum().clamp(min=1e-6)
+    return mean_over_all(total, weights[(semantics[semantics > 0] - 1)].sum(), 1e-6)
+
+
+def lovasz_loss(logits: Float[Tensor, "items classes"], semantics: Int64[Tensor, "items"]) -> Float[Tensor, ""]:
+    """Lovász-Softmax (CVPR 2018, Eq. 11): a surrogate of 1 - IoU, averaged over the classes present; void is left out.
+
+    It is no sum over items: several processes average the losses of their own items.
+
+    Sorted by error, the n-th item weighs what it adds to 1 - IoU when the first n are the ones that are wrong.
+    """
+    known = semantics > 0
+    truth = semantics[known] - 1
+    present = truth.unique()
+    is_class = (truth[:, None] == present).float()
+    errors = (is_class - logits[known].float().softmax(1)[:, present]).abs()
+    errors, order = errors.sort(dim=0, descending=True)
+    is_class = is_class.gather(0, order)
+    missed, invented = is_class.cumsum(0), (1 - is_class).cumsum(0)
+    loss = 1 - (is_class.sum(0) - missed) / (is_class.sum(0) + invented)
+    steps = torch.cat([loss[:1], loss[1:] - loss[:-1]])
+    return (errors * steps).sum() / max(len(present), 1)
 
 
 def focal_loss(
@@ -56,15 +78,16 @@ def focal_loss(
     centre = target == 1
     missed = (1 - probability) ** 2 * probability.log()
     invented = (1 - target) ** 4 * probability**2 * (1 - probability).log()
-    return -torch.where(centre, missed, invented).sum() / centre.sum().clamp(min=1)
+    return mean_over_all(-torch.where(centre, missed, invented).sum(), centre.sum())
 
 
 def regression_losses(maps: BevMaps, targets: BevTargets) -> dict[str, Float[Tensor, ""]]:
     """L1 at the centre cells, averaged over instances (Eq. 2 and 4); unknown velocities do not count."""
     batch, x, y = targets.cells.unbind(1)
     known = targets.velocity_known[:, None].float()
-    count = max(len(batch), 1)
+    count = torch.tensor(len(batch), device=batch.device)
     at_centres = {name: getattr(maps, name)[batch, :, x, y].float() for name in ("offset", "height", "extent")}
-    losses = {name: (value - getattr(targets, name)).abs().sum() / count for name, value in at_centres.items()}
+    errors = {name: (value - getattr(targets, name)).abs().sum() for name, value in at_centres.items()}
+    losses = {name: mean_over_all(error, count) for name, error in errors.items()}
     error = (maps.velocity[batch, :, x, y].float() - targets.velocity).abs() * known
-    return losses | {"velocity": error.sum() / known.sum().clamp(min=1)}
+    return losses | {"velocity": mean_over_all(error.sum(), known.sum())}

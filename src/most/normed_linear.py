@@ -14,6 +14,8 @@ from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 from torch.nn import functional as F
 
+from most.processes import count, summed
+
 MOMENTUM = 0.1  # of the running statistics
 
 
@@ -33,19 +35,21 @@ class NormedLinear(nn.Module):
         self, x: Float[Tensor, "rows in_channels"]
     ) -> tuple[Float[Tensor, "out_channels in_channels"], Float[Tensor, "out_channels"]]:
         """Return the weight and bias that make product and normalisation of these rows one."""
-        mean, variance = self._statistics(x) if self.training and len(x) > 1 else self._running()
+        rows = count(len(x), x.device) if self.training else 0
+        mean, variance = self._statistics(x, rows) if rows > 1 else self._running()
         scale = self.norm.weight * torch.rsqrt(variance + self.norm.eps)
         return self.linear.weight * scale[:, None], self.norm.bias - scale * mean
 
     def _statistics(
-        self, x: Float[Tensor, "rows in_channels"]
+        self, x: Float[Tensor, "rows in_channels"], rows: int
     ) -> tuple[Float[Tensor, "out_channels"], Float[Tensor, "out_channels"]]:
-        """Return mean and variance of the product, and note them in the running statistics."""
-        rows, weight = len(x), self.linear.weight
+        """Return mean and variance of the product over the ``rows`` of all processes; note them in the running ones."""
+        weight = self.linear.weight
         with torch.autocast(x.device.type, enabled=False):  # squares need the full precision
-            mean, second = _Moments.apply(x.to(weight.dtype))
-            covariance = second - mean[:, None] * mean
-            mean, variance = weight @ mean, ((weight @ covariance) * weight).sum(1).clamp(min=0)
+            moments: Tensor = _Moments.apply(x.to(weight.dtype), rows)
+            mean, second = summed(moments).split([1, x.shape[1]])
+            covariance = second - mean.T * mean
+            mean, variance = (weight @ mean.T).squeeze(1), ((weight @ covariance) * weight).sum(1).clamp(min=0)
         with torch.no_grad():
             running_mean, running_variance = self._running()
             running_mean.lerp_(mean, MOMENTUM)
@@ -60,15 +64,17 @@ class NormedLinear(nn.Module):
 
 
 class _Moments(torch.autograd.Function):
-    """Mean of the rows and of their outer products; one product backwards, where autograd would form four."""
+    """Sums of the rows (first) and of their outer products (below), over ``rows``; one product on the way back."""
 
     @staticmethod
-    def forward(ctx: Any, x: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(ctx: Any, x: Tensor, rows: int) -> Tensor:
         ctx.save_for_backward(x)
-        return x.mean(0), x.T @ x / len(x)
+        ctx.rows = rows
+        return torch.cat([x.sum(0, keepdim=True), x.T @ x]) / rows
 
     @staticmethod
     @once_differentiable
-    def backward(ctx: Any, by_mean: Tensor, by_second: Tensor) -> Tensor:
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None]:
         (x,) = ctx.saved_tensors
-        return torch.addmm(by_mean / len(x), x, (by_second + by_second.T) / len(x))
+        by_sum, by_second = (gradient / ctx.rows).split([1, x.shape[1]])
+        return torch.addmm(by_sum, x, by_second + by_second.T), None

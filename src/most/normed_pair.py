@@ -12,6 +12,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
+from most.norm import normalise
 from most.normed_linear import NormedLinear
 
 BLOCK = 8192  # rows
@@ -28,12 +29,8 @@ class NormedPair(nn.Module):
     def forward(self, x: Float[Tensor, "rows in_channels"]) -> Float[Tensor, "rows out_channels"]:
         """Normalise by the batch's statistics in training (of two rows or more), by the running ones else."""
         weight, bias = self.wide.folded(x)
-        product, norm = relu_product(x, weight, bias, self.narrow.linear.weight), self.narrow.norm
-        measure = self.training and len(x) > 1
-        out = F.batch_norm(
-            product, norm.running_mean, norm.running_var, norm.weight, norm.bias, measure, norm.momentum or 0, norm.eps
-        )
-        return F.relu_(out)
+        product = relu_product(x, weight, bias, self.narrow.linear.weight)
+        return F.relu_(normalise(product, self.narrow.norm))
 
 
 def relu_product(

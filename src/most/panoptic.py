@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from most.errors import ConfigError
-from most.membership import Pairs, RegionOfInterest
+from most.membership import Evidence, Pairs, RegionOfInterest
 from most.structures import Detections, Panoptic
 
 MEMBER = 0.5  # a pair belongs together above this confidence (Algorithm 1, line 10)
@@ -23,9 +23,7 @@ UNCLAIMED = ("nearest", "cluster", "zero")
 class Membership(Protocol):
     """Whatever rates pairs of points and centres."""
 
-    def __call__(
-        self, points: Float[Tensor, "points 3"], pairs: Pairs, detections: Detections
-    ) -> Float[Tensor, "pairs"]:
+    def __call__(self, evidence: Evidence, pairs: Pairs) -> Float[Tensor, "pairs"]:
         """Return each pair's confidence in [0, 1]."""
         ...
 
@@ -61,25 +59,19 @@ class Assignment:
 
 
 def fuse(
-    points: Float[Tensor, "points 3"],
-    semantics: Int64[Tensor, "points"],
-    things: list[int],
-    detections: Detections,
-    membership: Membership,
-    roi: RegionOfInterest,
-    fusion: Fusion,
+    evidence: Evidence, things: list[int], membership: Membership, roi: RegionOfInterest, fusion: Fusion
 ) -> Assignment:
-    """Return the panoptic labels of one sweep.
+    """Return the panoptic labels of one sweep; ``things`` are training ids.
 
-    ``points`` and ``detections`` are in the sensor frame (m), ``semantics`` and ``things`` are training ids. A
-    detection's points keep their predicted class, which is the detection's own: points of another class are never
+    A detection's points keep their predicted class, which is the detection's own: points of another class are never
     its members (Algorithm 1, line 7, prints this the wrong way round).
     """
+    points, semantics, detections = evidence.points, evidence.semantics, evidence.detections
     pairs = roi.pairs(points, semantics, detections)
-    confidence = membership(points, pairs, detections)
+    confidence = membership(evidence, pairs)
     members = confidence > MEMBER
     rank = confidence if fusion.overlap == "confident" else -pairs.detections.to(confidence.dtype)
-    claimed = _best(len(points), Pairs(pairs.points[members], pairs.detections[members]), rank[members])
+    claimed = _best(len(points), pairs.select(members), rank[members])
     ids = claimed + 1
     if fusion.unclaimed != "zero":
         left = torch.isin(semantics, torch.tensor(things, device=semantics.device)) & (claimed < 0)

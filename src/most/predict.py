@@ -1,6 +1,6 @@
 """Label a split with a trained model: ``python -m most.predict checkpoint=FILE split=val out=FOLDER``."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,8 @@ from most.config import conf_dir, register, store_root, typed
 from most.datasets.dataset import WindowDataset
 from most.datasets.semantickitti import SemanticKITTI
 from most.entry import run
+from most.errors import ConfigError
+from most.membership import Nearest
 from most.predicting import claim_folder, unfinished, write_predictions
 
 
@@ -25,7 +27,12 @@ class PredictConfig:
     out: str = MISSING
     split: str = "val"
     dataset: Any = None
+    membership: str = "trained"  # the checkpoint's own; nearest: by distance alone, to compare
     device: str = "auto"  # auto: a GPU where there is one
+
+    def __post_init__(self) -> None:
+        if self.membership not in ("trained", "nearest"):
+            raise ConfigError(f"membership: expected trained or nearest, found {self.membership}")
 
 
 register()
@@ -36,14 +43,17 @@ def predict(config: PredictConfig) -> None:
     """Write ``sequences/NN/predictions/*.label`` and ``sequences/NN/detections/*.npz`` to the folder ``out``."""
     checkpoint, out, dataset = Path(config.checkpoint), Path(config.out), config.dataset
     trained = load_trained(checkpoint)
+    predictor = (
+        replace(trained.predictor, membership=Nearest()) if config.membership == "nearest" else trained.predictor
+    )
     reader = SemanticKITTI(dataset.root, dataset.splits)
     frames = reader.frames(config.split)
-    claim_folder(out, checkpoint, reader, config.split)
+    claim_folder(out, checkpoint, reader, config.split, config.membership)
     frames = unfinished(reader, frames, out)
     windows = WindowDataset(reader, frames, trained.sweeps)
     loader = DataLoader(windows, dataset.batch_size, num_workers=dataset.workers, collate_fn=list)
     device = config.device if config.device != "auto" else "cuda" if torch.cuda.is_available() else "cpu"
-    write_predictions(trained.predictor, loader, reader, out, len(frames), torch.device(device))
+    write_predictions(predictor, loader, reader, out, len(frames), torch.device(device))
 
 
 @hydra.main(version_base=None, config_path=str(conf_dir()), config_name="predict")

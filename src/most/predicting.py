@@ -20,12 +20,13 @@ from most.structures import Panoptic, Sample
 RECORD = "prediction.json"
 
 
-def claim_folder(out: Path, checkpoint: Path, reader: Reader, split: str) -> None:
+def claim_folder(out: Path, checkpoint: Path, reader: Reader, split: str, membership: str) -> None:
     """Note in ``out`` what is written there; another model's or dataset's are not mixed in, the same one's go on."""
     claim = {
         "checkpoint_sha256": hashlib.sha256(checkpoint.read_bytes()).hexdigest(),
         "dataset": str(Path(reader.root).resolve()),
         "split": split,
+        "membership": membership,
         "sequences": reader.sequences(split),
     }
     path, record = out / RECORD, json.dumps(claim)
@@ -38,7 +39,8 @@ def claim_folder(out: Path, checkpoint: Path, reader: Reader, split: str) -> Non
             file.write(record)
     elif path.read_bytes() != record.encode():  # whatever it holds, it need not be JSON
         raise DataError(
-            f"{out}: holds predictions of another checkpoint, dataset or split; choose another out, or remove it"
+            f"{out}: holds predictions of another checkpoint, membership, dataset or split; choose another out, "
+            "or remove it"
         )
 
 
@@ -52,7 +54,8 @@ def write_predictions(
     predictor: Predictor, batches: Iterable[list[Sample]], reader: Reader, out: Path, total: int, device: torch.device
 ) -> None:
     """Label ``total`` sweeps and write each when it is done."""
-    predictor.network.eval().to(device)
+    for module in predictor.modules().values():
+        module.eval().to(device)
     with tqdm(total=total, desc="predict", unit="sweep") as progress:
         for samples in batches:
             moved = [sample.to(device) for sample in samples]

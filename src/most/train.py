@@ -1,6 +1,7 @@
 """Train MOST: ``python -m most.train +experiment=semkitti_max``."""
 
 from pathlib import Path
+from typing import Any
 
 import hydra
 import lightning as L
@@ -8,36 +9,55 @@ import torch
 import wandb
 from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
-from omegaconf import DictConfig
+from lightning.pytorch.loggers import Logger
+from omegaconf import DictConfig, OmegaConf
 
+from most.assembly import read_checkpoint
 from most.config import Config, conf_dir, register, typed
 from most.datasets.datamodule import SemanticKITTIDataModule
 from most.entry import run
 from most.metrics.report import write_report
-from most.training import build_stage, build_trainer, check_resume
+from most.resuming import stages_to_run
+from most.training import Stage, build_detection, build_membership_stage, build_trainer, handed_over
 
 register()
 
 
 def train(config: Config, folder: Path) -> None:
-    """Train stage 1 and write ``checkpoints/`` and ``metrics.json``, the last weights' figures, to ``folder``."""
-    L.seed_everything(config.seed, workers=True)
+    """Train the stages that are asked for, one after the other.
+
+    Writes ``checkpoints/`` and ``metrics.json``, the figures of the last stage's last weights, to ``folder``.
+    """
     if config.trainer.threads:
         torch.set_num_threads(config.trainer.threads)
     data = SemanticKITTIDataModule(config.dataset, config.augment, config.extent, config.seed)
     for split in ("train", "val"):
         data.reader.sequences(split)  # raises where the dataset is not there, before any work
-    if config.resume:
-        check_resume(config, data.reader.taxonomy)
+    names = stages_to_run(config, data.reader.taxonomy)
+    settings: Any = OmegaConf.to_container(OmegaConf.structured(config))
     try:
-        trainer = build_trainer(config, folder)
-        stage = build_stage(config, data)
-        trainer.fit(stage, datamodule=data, ckpt_path=config.resume, weights_only=True)
-        if stage.report.get("epochs") != config.stage.epochs:
-            trainer.validate(stage, datamodule=data, verbose=False)
-        write_report(folder / "metrics.json", stage.report)
+        logger = config.logger.build(folder, config.name, settings)
+        for name in names:
+            run_stage(name, config, data, folder, logger)
     finally:
         wandb.finish()  # the next job of a sweep runs in this process, and is another run
+
+
+def run_stage(name: str, config: Config, data: SemanticKITTIDataModule, folder: Path, logger: Logger | bool) -> None:
+    """Train one stage to its end, and write what it reached."""
+    L.seed_everything(config.seed, workers=True)
+    resume = config.resume if config.resume and read_checkpoint(Path(config.resume))["most_stage"] == name else None
+    stage: Stage
+    if name == "detection":
+        stage = build_detection(config, data)
+    else:
+        stage1 = resume or config.stage1 or handed_over(config, folder)
+        stage = build_membership_stage(config, Path(stage1), data.reader.taxonomy)
+    trainer = build_trainer(config, stage, folder, logger)
+    trainer.fit(stage, datamodule=data, ckpt_path=resume, weights_only=True)
+    if stage.report.get("epochs") != stage.training_settings.epochs:
+        trainer.validate(stage, datamodule=data, verbose=False)
+    write_report(folder / "metrics.json", stage.report)
 
 
 @hydra.main(version_base=None, config_path=str(conf_dir()), config_name="train")

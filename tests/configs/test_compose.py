@@ -12,6 +12,7 @@ ROOTS = sorted(path.stem for path in conf_dir().glob("*.yaml"))
 OPTIONS = sorted((path.parent.name, path.stem) for path in conf_dir().glob("*/*.yaml"))
 OF_OTHER_ROOTS = {"simulation": "simulate"}
 REQUIRED = {
+    "compare": ["reports={a: a.json}"],
     "draw": ["predictions=a", "sequence='08'"],
     "predict": ["checkpoint=a.ckpt", "out=b"],
     "evaluate": ["predictions=a"],
@@ -51,12 +52,12 @@ def test_every_option_names_a_schema():
 @pytest.mark.parametrize(
     ("override", "message"),
     [
-        ("stage.max_lr=-1", "stage.max_lr"),
+        ("stage.detection.max_lr=-1", "stage.detection.max_lr"),
         ("grid.voxel_size=[0,1,1]", "grid.voxel_size"),
         ("trainer.precision=foo", "trainer.precision"),
         ("seed=-1", "seed"),
-        ("stage.max_lr=nan", "stage.max_lr"),
-        ("stage.losses.heatmap=-1", "losses.heatmap"),
+        ("stage.detection.max_lr=nan", "stage.detection.max_lr"),
+        ("stage.detection.losses.heatmap=-1", "losses.heatmap"),
         ("backbone.widths=[1,2]", "backbone.widths"),
     ],
 )
@@ -72,4 +73,4 @@ def test_unknown_keys_and_wrong_types_do_not_compose(override):
 
 
 def test_composed_configurations_are_plain_enough_to_log():
-    assert OmegaConf.to_container(compose("train"), resolve=True)["stage"]["epochs"] == 20
+    assert OmegaConf.to_container(compose("train"), resolve=True)["stage"]["detection"]["epochs"] == 20

@@ -7,7 +7,7 @@ from hydra import compose, initialize_config_dir
 from most.assembly import build_network, model_parts
 from most.config import conf_dir, register, typed
 from most.datasets.taxonomy import Taxonomy
-from most.membership import Nearest
+from most.membership import PointSegMLPSettings
 from most.modal.extent import TrackMax
 from most.normed_linear import NormedLinear
 from most.sparse import InverseConv, StridedConv, SubmanifoldConv
@@ -47,24 +47,31 @@ def test_augmentation_and_extents():
     assert (augment.rotation, list(augment.scale), list(augment.translation)) == (45.0, [0.9, 1.1], [0.5] * 3)
     assert (augment.intensity, augment.half_swap) == (0, 0)
     assert recipe().extent == TrackMax(floor=0.05)
-    assert recipe().membership == Nearest()
+    assert recipe().membership == PointSegMLPSettings(widths=[64, 64, 64], bev=True, point=True)
 
 
 def test_optimiser_schedule_and_batch():
-    stage = recipe().stage
+    stage = recipe().stage.detection
     assert stage.optimizer == "adam"
     assert (stage.max_lr, stage.initial_divisor, stage.warm_up) == (1e-3, 10.0, 0.4)
     assert (stage.weight_decay, stage.clip) == (0.01, 35.0)
     assert (stage.batch_size, stage.epochs) == (8, 20)
-    accumulated = recipe().trainer.accumulated(stage.batch_size, recipe().dataset.batch_size)
+    accumulated = recipe().trainer.accumulated(stage.batch_size, recipe().dataset.batch_size, "detection")
     assert accumulated * recipe().dataset.batch_size == 8
 
 
+def test_stage_2_follows_on_the_best_stage_1():
+    stage = recipe().stage
+    assert (stage.run, stage.hand_over) == (["detection", "membership"], "best")
+    second = stage.membership
+    assert (second.lr, second.momentum, second.epochs, second.batch_size, second.clip) == (5e-4, 0.9, 20, 8, None)
+
+
 def test_losses_and_targets():
-    weights = recipe().stage.losses
+    weights = recipe().stage.detection.losses
     assert (weights.voxel, weights.point, weights.heatmap, weights.height, weights.velocity) == (1, 1, 1, 1, 1)
     assert (weights.offset, weights.extent, weights.class_balance) == (1, 1, 0)
-    targets = recipe().stage.targets
+    targets = recipe().stage.detection.targets
     assert (targets.kind, targets.min_variance, targets.min_points) == ("variance", 1.0, 1)
 
 
@@ -107,7 +114,7 @@ def test_bev_branch_and_head():
 
 
 def test_adam_under_a_one_cycle_schedule():
-    optimizer, schedule = one_cycle([torch.nn.Parameter(torch.zeros(1))], recipe().stage, steps=100)
+    optimizer, schedule = one_cycle([torch.nn.Parameter(torch.zeros(1))], recipe().stage.detection, steps=100)
     assert type(optimizer) is torch.optim.Adam
     assert optimizer.param_groups[0]["weight_decay"] == 0.01
     rates = []

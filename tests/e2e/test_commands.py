@@ -9,14 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+MODEL = "run/checkpoints/membership-last.ckpt"
 TINY = [
     "grid.voxel_size=[0.4,0.4,0.4]",
     "backbone.widths=[4,4,8,8]",
     "backbone.bev_channels=8",
     "encoder.widths=[8,4]",
     "heads.centre.channels=8",
-    "stage.epochs=2",
-    "stage.batch_size=2",
+    "stage.detection.epochs=2",
+    "stage.detection.batch_size=2",
+    "stage.membership.epochs=2",
+    "stage.membership.batch_size=1",
+    "membership.widths=[4,4]",
     "trainer.validate_every=3",  # never during the two epochs: the last weights are scored all the same
     "trainer.threads=1",
     "trainer.log_every=1",
@@ -55,8 +59,11 @@ def test_training_leaves_metrics_checkpoints_and_pictures(run):
     assert 0 <= report["panoptic"]["pq"] <= 1
     assert {"car", "road"} <= set(report["panoptic"]["per_class"])
     assert report["epochs"] == 2
-    assert [path.name for path in (run / "run" / "checkpoints").iterdir()] == ["last.ckpt"]
-    assert list((run / "run" / "pictures").rglob("*.png"))
+    assert 0 <= report["panoptic_nearest"]["pq"] <= 1
+    kept = sorted(path.name for path in (run / "run" / "checkpoints").iterdir())
+    assert kept == ["detection-last.ckpt", "membership-last.ckpt"]
+    for stage in ("detection", "membership"):
+        assert list((run / "run" / "pictures" / stage).rglob("*.png"))
 
 
 def test_the_offline_wandb_run_holds_losses_metrics_rate_throughput_and_pictures(run):
@@ -66,12 +73,13 @@ def test_the_offline_wandb_run_holds_losses_metrics_rate_throughput_and_pictures
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    for key in ("train/loss_heatmap", "train/loss_voxel", "val/pq", "val/miou", "lr-Adam", "scans_per_second", "bev_"):
+    for key in ("train/loss_heatmap", "train/loss_voxel", "val/pq", "val/miou", "lr-Adam", "scans_per_second", "bev_",
+                "membership/train/loss", "membership/val/pq", "membership/val/nearest_pq", "lr-SGD"):  # fmt: skip
         assert key in done.stdout, key
 
 
 def test_predictions_cover_every_point_and_are_scored(run):
-    done = most(run, "predict", "checkpoint=run/checkpoints/last.ckpt", "split=val", "out=predictions",
+    done = most(run, "predict", f"checkpoint={MODEL}", "split=val", "out=predictions",
                 "dataset=simulated", "dataset.root=streets", "dataset.workers=0", *SPLITS)  # fmt: skip
     assert done.returncode == 0, done.stderr
     written = sorted((run / "predictions" / "sequences" / "01" / "predictions").glob("*.label"))
@@ -103,7 +111,7 @@ def test_a_split_without_labels_is_predicted_too(run):
     blind.mkdir(parents=True)
     for name in ("velodyne", "calib.txt", "poses.txt", "times.txt"):
         (blind / name).symlink_to(run / "streets" / "sequences" / "01" / name)
-    done = most(run, "predict", "checkpoint=run/checkpoints/last.ckpt", "split=test", "out=blind_predictions",
+    done = most(run, "predict", f"checkpoint={MODEL}", "split=test", "out=blind_predictions",
                 "dataset=simulated", "dataset.root=blind", "dataset.workers=0", *SPLITS)  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert len(list((run / "blind_predictions").rglob("*.label"))) == 3
@@ -111,24 +119,24 @@ def test_a_split_without_labels_is_predicted_too(run):
 
 def test_prediction_goes_on_where_it_stopped_and_refuses_another_models_folder(run):
     arguments = ["split=val", "dataset=simulated", "dataset.root=streets", "dataset.workers=0", *SPLITS]
-    assert most(run, "predict", "checkpoint=run/checkpoints/last.ckpt", "out=again", *arguments).returncode == 0
+    assert most(run, "predict", f"checkpoint={MODEL}", "out=again", *arguments).returncode == 0
     labels = sorted((run / "again").rglob("*.label"))
     kept = labels[0].stat().st_mtime_ns
     labels[1].unlink()
-    assert most(run, "predict", "checkpoint=run/checkpoints/last.ckpt", "out=again", *arguments).returncode == 0
+    assert most(run, "predict", f"checkpoint={MODEL}", "out=again", *arguments).returncode == 0
     assert labels[1].is_file()
     assert labels[0].stat().st_mtime_ns == kept
-    other = most(run, "predict", "checkpoint=run/checkpoints/last.ckpt", "out=streets", *arguments)
+    other = most(run, "predict", f"checkpoint={MODEL}", "out=streets", *arguments)
     assert other.returncode == 2
     assert "choose another out" in other.stderr
 
 
 def test_a_run_does_not_go_on_with_another_length_or_from_another_model(run):
-    arguments = ["+experiment=sim_demo", "dataset.root=streets", "resume=run/checkpoints/last.ckpt",
+    arguments = ["+experiment=sim_demo", "dataset.root=streets", f"resume={MODEL}",
                  "hydra.run.dir=other", *SPLITS, *TINY]  # fmt: skip
-    longer = most(run, "train", *arguments, "stage.epochs=3")
+    longer = most(run, "train", *arguments, "stage.membership.epochs=3")
     assert longer.returncode == 2
-    assert "stage.epochs: expected 2" in longer.stderr
+    assert "stage.membership.epochs: expected 2" in longer.stderr
     wider = most(run, "train", *arguments, "encoder.widths=[8,8]")
     assert wider.returncode == 2
     assert "was trained with another model" in wider.stderr

@@ -6,8 +6,9 @@ import pytest
 import torch
 from torch import Tensor
 
+from most.membership import match_detections
 from most.metrics import membership
-from most.metrics.membership import MembershipCounts, match_detections, membership_counts
+from most.metrics.membership import MembershipCounts, membership_counts
 from most.structures import Detections, Instances
 
 CAR, PERSON = 1, 2

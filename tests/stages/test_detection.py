@@ -79,7 +79,9 @@ def test_without_any_label_semantics_cost_nothing_and_gradients_are_finite():
 
 
 def test_the_total_is_the_weighted_sum():
-    weights = LossWeights(voxel=2.0, point=3.0, heatmap=5.0, offset=7.0, height=11.0, extent=13.0, velocity=0.0)
+    weights = LossWeights(
+        voxel=2.0, point=3.0, heatmap=5.0, offset=7.0, height=11.0, extent=13.0, velocity=0.0, lovasz=1.5
+    )
     made = stage(losses=weights)
     total = made.training_step([street()], 0)
     apart = {name: made.logged[f"train/loss_{name}"] for name in vars(weights) if name != "class_balance"}
@@ -145,13 +147,14 @@ def test_validation_scores_a_split_and_starts_afresh():
 def test_sweeps_without_a_truth_are_predicted_and_not_scored():
     made = stage().eval()
     assert len(made.validation_step([window(cloud(20))], 0)["predictions"]) == 1
-    assert made.quality.per_class()["road"]["fp"] == made.membership_accuracy.counts.sum() == 0
+    assert made.scores.quality.per_class()["road"]["fp"] == made.scores.membership.counts.sum() == 0
 
 
 def test_checkpoints_carry_the_description():
     content = {}
     stage().on_save_checkpoint(content)
     assert content["most"] == {"format": 1}
+    assert content["most_stage"] == "detection"
 
 
 @pytest.mark.parametrize("steps", [*range(1, 12), 100])
@@ -183,6 +186,6 @@ def test_adamw_is_a_choice():
 )
 def test_impossible_settings_are_refused(wrong):
     with pytest.raises(
-        ConfigError, match=rf"stage\.{next(iter(wrong))}: expected .*found {next(iter(wrong.values()))}"
+        ConfigError, match=rf"stage\.detection\.{next(iter(wrong))}: expected .*found {next(iter(wrong.values()))}"
     ):
         DetectionTraining(**wrong)

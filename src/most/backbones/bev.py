@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float, Int64
 from torch import Tensor, nn
 
-from most.backbones.norm import NormReLU
+from most.norm import NormReLU
 from most.sparse import SparseTensor
 
 

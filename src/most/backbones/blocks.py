@@ -4,7 +4,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from most.backbones.norm import NormReLU
+from most.norm import NormReLU
 from most.sparse import InverseConv, Sites, SparseTensor, StridedConv, SubmanifoldConv
 
 ACROSS_X = (3, 1, 3)

@@ -7,6 +7,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from most.errors import ConfigError
+from most.norm import NormReLU
 from most.structures import BevMaps
 
 REGRESSED = {"offset": 2, "height": 1, "extent": 3, "velocity": 2}
@@ -33,9 +34,7 @@ class CentreMaps(nn.Module):
 
     def __init__(self, bev_channels: int, channels: int, num_things: int, heatmap_bias: float) -> None:
         super().__init__()
-        self.shared = nn.Sequential(
-            nn.Conv2d(bev_channels, channels, 3, padding=1, bias=False), nn.BatchNorm2d(channels), nn.ReLU(inplace=True)
-        )
+        self.shared = nn.Sequential(nn.Conv2d(bev_channels, channels, 3, padding=1, bias=False), NormReLU(channels))
         self.heatmap = nn.Conv2d(channels, num_things, 3, padding=1)
         self.regression = nn.Conv2d(channels, sum(REGRESSED.values()), 3, padding=1)
         nn.init.constant_(self.heatmap.bias, heatmap_bias)  # type: ignore[arg-type]

@@ -5,17 +5,19 @@ from dataclasses import dataclass
 from jaxtyping import Float
 from torch import Tensor
 
+from most.membership.evidence import Channels, Evidence
 from most.membership.roi import Pairs
-from most.structures import Detections
 
 
 @dataclass
 class Nearest:
     """Membership by distance alone; it has nothing to set and nothing to train."""
 
-    def __call__(
-        self, points: Float[Tensor, "points 3"], pairs: Pairs, detections: Detections
-    ) -> Float[Tensor, "pairs"]:
+    def build(self, channels: Channels) -> "Nearest":
+        """It is its own network."""
+        return self
+
+    def __call__(self, evidence: Evidence, pairs: Pairs) -> Float[Tensor, "pairs"]:
         """Return the confidence of each pair, in (0.5, 1]: 1 at the centre, less with distance."""
-        distance = (points[pairs.points] - detections.centres[pairs.detections]).norm(dim=1)
+        distance = (evidence.points[pairs.points] - evidence.detections.centres[pairs.detections]).norm(dim=1)
         return 0.5 + 0.5 / (1 + distance)

@@ -63,6 +63,10 @@ class Pairs:
     def __len__(self) -> int:
         return len(self.points)
 
+    def select(self, keep: Tensor) -> "Pairs":
+        """Keep the pairs a boolean mask or an index names."""
+        return Pairs(self.points[keep], self.detections[keep])
+
 
 def _empty(device: torch.device) -> Pairs:
     none = torch.zeros(0, dtype=torch.long, device=device)

@@ -1,6 +1,6 @@
 """The benchmarks' figures: pure functions, and running totals of them for training."""
 
-from most.metrics.membership import MembershipCounts, match_detections, membership_counts
+from most.metrics.membership import MembershipCounts, membership_counts
 from most.metrics.panoptic import PanopticStatistics, panoptic_figures, panoptic_statistics, per_class
 from most.metrics.running import MembershipAccuracy, PanopticQuality
 
@@ -9,7 +9,6 @@ __all__ = [
     "MembershipCounts",
     "PanopticQuality",
     "PanopticStatistics",
-    "match_detections",
     "membership_counts",
     "panoptic_figures",
     "panoptic_statistics",

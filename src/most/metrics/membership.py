@@ -9,11 +9,11 @@ RoIs of two or more matched detections of their class.
 
 from dataclasses import astuple, dataclass
 
-import numpy as np
 import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
+from most.membership.matching import match_detections
 from most.structures import Detections, Instances
 
 CHUNK = 2**20  # pairs of points and detections compared at once: some 30 MB
@@ -37,25 +37,6 @@ class MembershipCounts:
             "membership_accuracy": _ratio(self.correct, self.total),
             "membership_accuracy_contested": _ratio(self.contested_correct, self.contested_total),
         }
-
-
-def match_detections(
-    detections: Detections, roi: Float[Tensor, "detections 3"], truth: Instances
-) -> Int64[Tensor, "detections"]:
-    """Return the instance that each detection stands for, -1 for none.
-
-    One to one by confidence: the most confident detection takes the nearest modal centre of its class inside its RoI
-    (a box of half-sizes ``roi`` about the centre, m), the next the nearest of those left.
-    """
-    away = (detections.centres[:, None] - truth.centres[None]).abs()
-    allowed = (detections.classes[:, None] == truth.classes[None]) & (away < roi[:, None]).all(2)
-    cost = torch.where(allowed, away.norm(dim=2), torch.inf).cpu().numpy()
-    matches = np.full(len(detections), -1)
-    for detection in detections.scores.argsort(descending=True, stable=True).tolist():
-        if np.isfinite(cost[detection]).any():
-            matches[detection] = cost[detection].argmin()
-            cost[:, matches[detection]] = np.inf
-    return torch.from_numpy(matches).to(roi.device)
 
 
 def membership_counts(

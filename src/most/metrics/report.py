@@ -1,4 +1,4 @@
-"""A report as a JSON file, and as a table to read."""
+"""Reports as JSON files, and as tables to read."""
 
 import json
 import math
@@ -6,10 +6,19 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
+from most.errors import DataError
 from most.files import atomic_write
 
 COLUMNS = ("pq", "sq", "rq", "iou")
 COUNTS = ("tp", "fp", "fn")
+COMPARED = {
+    "PQ": "pq",
+    "PQ present": "pq_present",
+    "PQ things": "pq_things",
+    "mIoU": "miou",
+    "membership": "membership_accuracy",
+    "contested": "membership_accuracy_contested",
+}
 
 
 def write_report(path: Path, report: Mapping[str, Any]) -> None:
@@ -17,6 +26,17 @@ def write_report(path: Path, report: Mapping[str, Any]) -> None:
     with atomic_write(path, "w") as file:
         json.dump(_without_nan(report), file, indent=2, allow_nan=False)
         file.write("\n")
+
+
+def read_report(path: Path) -> dict[str, Any]:
+    """Read a report; raises DataError for a file that is none."""
+    try:
+        report = json.loads(path.read_text())
+    except (OSError, ValueError) as error:
+        raise DataError(f"{path}: expected a report of most.evaluate or most.train, found none ({error})") from error
+    if not isinstance(report, dict) or not isinstance(report.get("panoptic"), dict):
+        raise DataError(f'{path}: expected a report with a section "panoptic", found other JSON; choose another')
+    return report
 
 
 def _without_nan(value: Any) -> Any:
@@ -47,6 +67,16 @@ def format_table(panoptic: Mapping[str, Any], things: Collection[str]) -> str:
             "  contested": "membership_accuracy_contested",
         }.items()
     ]
+    return "\n".join(lines)
+
+
+def format_comparison(reports: Mapping[str, Mapping[str, Any]]) -> str:
+    """The main figures of several reports in percent, a line each."""
+    width = max(map(len, reports))
+    lines = [f"{'':<{width}}" + "".join(f"  {title:>{max(len(title), 6)}}" for title in COMPARED)]
+    for name, report in reports.items():
+        figures = {title: _percent(report["panoptic"].get(key)) for title, key in COMPARED.items()}
+        lines.append(f"{name:<{width}}" + "".join(f"  {figures[title]:>{max(len(title), 6)}}" for title in COMPARED))
     return "\n".join(lines)
 
 

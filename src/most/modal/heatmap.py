@@ -78,4 +78,4 @@ def gaussian_radius(sizes: Float[Tensor, "boxes 2"], min_overlap: float) -> Floa
 
 def _require(holds: bool, key: str, expected: str, found: object) -> None:
     if not holds:
-        raise ConfigError(f"stage.targets.{key}: expected {expected}, found {found!r}")
+        raise ConfigError(f"stage.detection.targets.{key}: expected {expected}, found {found!r}")

@@ -10,7 +10,8 @@ from lightning.pytorch.callbacks import Callback
 class Throughput(Callback):
     """Logs ``train/scans_per_second``, loading included."""
 
-    def __init__(self) -> None:
+    def __init__(self, prefix: str = "") -> None:
+        self.prefix = prefix
         self.since: float | None = None
 
     def on_train_epoch_start(self, *_: Any) -> None:
@@ -23,5 +24,6 @@ class Throughput(Callback):
         """Time one batch from the end of the one before."""
         now = time.perf_counter()
         if self.since is not None:
-            pl_module.log("train/scans_per_second", len(batch) * trainer.world_size / (now - self.since), batch_size=1)
+            rate = len(batch) * trainer.world_size / (now - self.since)
+            pl_module.log(f"{self.prefix}train/scans_per_second", rate, batch_size=1)
         self.since = now

@@ -13,12 +13,12 @@ from torch import Tensor
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError
 from most.inference import Prediction, Predictor
-from most.losses import LossWeights, class_weights, focal_loss, regression_losses, semantic_loss
-from most.metrics import MembershipAccuracy, PanopticQuality
+from most.losses import LossWeights, class_weights, focal_loss, lovasz_loss, regression_losses, semantic_loss
 from most.modal.heatmap import HeatmapTargets
 from most.modal.targets import bev_targets
 from most.modal.voxel_labels import majority
 from most.network import Network, NetworkOutput
+from most.stages.scores import Scores
 from most.structures import Sample
 
 
@@ -39,19 +39,21 @@ class DetectionTraining:
 
     def __post_init__(self) -> None:
         if self.optimizer not in ("adam", "adamw"):
-            raise ConfigError(f"stage.optimizer: expected adam or adamw, found {self.optimizer}")
+            raise ConfigError(f"stage.detection.optimizer: expected adam or adamw, found {self.optimizer}")
         if not 0 < self.warm_up < 1:
-            raise ConfigError(f"stage.warm_up: expected a share in (0, 1), found {self.warm_up}")
+            raise ConfigError(f"stage.detection.warm_up: expected a share in (0, 1), found {self.warm_up}")
         for name in ("max_lr", "initial_divisor", "clip", "batch_size", "epochs"):
             if not getattr(self, name) > 0:
-                raise ConfigError(f"stage.{name}: expected a positive number, found {getattr(self, name)}")
+                raise ConfigError(f"stage.detection.{name}: expected a positive number, found {getattr(self, name)}")
         if not self.weight_decay >= 0:
-            raise ConfigError(f"stage.weight_decay: expected a number >= 0, found {self.weight_decay}")
+            raise ConfigError(f"stage.detection.weight_decay: expected a number >= 0, found {self.weight_decay}")
 
 
 class DetectionStage(L.LightningModule):
     """Wires network, targets, losses and metrics."""
 
+    name = "detection"
+    prefix = ""  # of the names under which losses and figures are logged
     class_weights: Tensor
 
     def __init__(
@@ -74,8 +76,7 @@ class DetectionStage(L.LightningModule):
         self.description = description
         weights = class_weights(class_counts[1:], training.losses.class_balance)
         self.register_buffer("class_weights", weights, persistent=False)
-        self.quality = PanopticQuality(taxonomy.class_names, taxonomy.things, taxonomy.min_points)
-        self.membership_accuracy = MembershipAccuracy()
+        self.scores = Scores(taxonomy)
         self.report: dict[str, Any] = {}  # the last validation's figures
 
     def losses(self, samples: list[Sample], output: NetworkOutput) -> dict[str, Float[Tensor, ""]]:
@@ -92,8 +93,10 @@ class DetectionStage(L.LightningModule):
             [sample.instances for sample in samples if sample.instances is not None],
             bev.lower, bev.cell, bev.shape, self.taxonomy.things, self.training_settings.targets,
         )  # fmt: skip
+        lovasz = self.training_settings.losses.lovasz > 0  # it sorts: not for nothing
         return {
             "voxel": semantic_loss(output.voxel_logits, voxel_semantics, self.class_weights),
+            **({"lovasz": lovasz_loss(output.voxel_logits, voxel_semantics)} if lovasz else {}),
             "point": semantic_loss(output.point_logits, semantics, self.class_weights),
             "heatmap": focal_loss(output.maps.heatmap, targets.heatmap),
             **regression_losses(output.maps, targets),
@@ -111,26 +114,15 @@ class DetectionStage(L.LightningModule):
     def validation_step(self, samples: list[Sample], _: int) -> dict[str, Any]:
         """Predict a batch and score it."""
         predictions = self.predict_step(samples, 0)
-        for sample, prediction in zip(samples, predictions, strict=True):
-            if sample.labels is None or sample.semantics is None or sample.instances is None:
-                continue
-            panoptic = prediction.panoptic
-            written = self.taxonomy.encode(panoptic.semantics, panoptic.ids)
-            self.quality.update(panoptic.semantics, written, sample.semantics, sample.labels)
-            self.membership_accuracy.update(
-                sample.points[: sample.num_current, :3], panoptic.semantics, sample.semantics, sample.labels,
-                prediction.detections, prediction.roi, prediction.claimed, sample.instances,
-            )  # fmt: skip
+        self.scores.update(samples, predictions)
         return {"predictions": predictions}
 
     def on_validation_epoch_end(self) -> None:
         """Log the split's figures, fractions in [0, 1]."""
-        figures = self.quality.compute() | self.membership_accuracy.compute()
         epochs = self.current_epoch + int(self.trainer.state.fn == "fit")  # the running one is not counted yet
-        self.report = {"epochs": epochs, "panoptic": figures | {"per_class": self.quality.per_class()}}
-        self.log_dict({f"val/{name}": value for name, value in figures.items()})
-        self.quality.reset()
-        self.membership_accuracy.reset()
+        figures = self.scores.take()
+        self.report = {"epochs": epochs, "panoptic": figures}
+        self.log_dict({f"val/{name}": value for name, value in figures.items() if name != "per_class"})
 
     def predict_step(self, samples: list[Sample], _: int) -> list[Prediction]:
         """Label every point of a batch's current sweeps."""
@@ -139,6 +131,7 @@ class DetectionStage(L.LightningModule):
     def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
         """Add what it takes to make the network again."""
         checkpoint["most"] = self.description
+        checkpoint["most_stage"] = self.name
         checkpoint["most_epochs"] = self.training_settings.epochs
 
     def configure_optimizers(self) -> OptimizerLRSchedulerConfig:

@@ -28,10 +28,10 @@ class TrainerSettings:
                 raise ConfigError(f"trainer.{key}: expected at least {lowest}, found {getattr(self, key)}")
 
     @staticmethod
-    def accumulated(effective: int, per_step: int) -> int:
+    def accumulated(effective: int, per_step: int, stage: str) -> int:
         """Return how many batches make an effective one of ``effective`` scans."""
         if effective % per_step:
             raise ConfigError(
-                f"stage.batch_size: expected a multiple of dataset.batch_size = {per_step}, found {effective}"
+                f"stage.{stage}.batch_size: expected a multiple of dataset.batch_size = {per_step}, found {effective}"
             )
         return effective // per_step

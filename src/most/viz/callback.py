@@ -17,9 +17,10 @@ from most.viz.bev import draw_bev, save
 class BevPictures(Callback):
     """Draws ``number`` sweeps a validation, evenly spread; W&B gets them as images, ``folder`` as PNG files."""
 
-    def __init__(self, number: int, folder: Path) -> None:
+    def __init__(self, number: int, folder: Path, prefix: str = "") -> None:
         self.number = number
         self.folder = folder
+        self.prefix = prefix  # of the images' names
 
     def on_validation_batch_end(
         self,
@@ -40,7 +41,7 @@ class BevPictures(Callback):
         name = f"{sample.sequence}_{sample.index:06d}"
         save(figure, self.folder / f"epoch_{trainer.current_epoch:03d}" / f"{name}.png")
         if isinstance(trainer.logger, WandbLogger):
-            trainer.logger.log_image(f"val/bev_{name}", [figure])
+            trainer.logger.log_image(f"{self.prefix}val/bev_{name}", [figure])
 
 
 def draw_prediction(sample: Sample, prediction: Prediction, taxonomy: Taxonomy) -> Figure:

@@ -8,8 +8,9 @@ from most.backbones import AsymmetricUNetSmallSettings
 from most.config import Config, Heads
 from most.datasets.datamodule import SemanticKITTISettings
 from most.errors import ConfigError, DataError
+from most.resuming import check_resume
 from most.stages.detection import DetectionTraining
-from most.training import check_resume
+from most.stages.settings import StageSettings
 from tiny import TAXONOMY, tiny_parts
 
 
@@ -18,11 +19,15 @@ def config(tmp_path):
     """A configuration that goes on from a checkpoint of its own."""
     parts = tiny_parts()
     made = Config(
-        resume=str(tmp_path / "last.ckpt"), dataset=SemanticKITTISettings(sweeps=2), stage=DetectionTraining(epochs=4),
+        resume=str(tmp_path / "last.ckpt"), dataset=SemanticKITTISettings(sweeps=2),
+        stage=StageSettings(detection=DetectionTraining(epochs=4)),
         heads=Heads(parts["centre_head"], parts["semantic_head"]),
         **{name: parts[name] for name in ("grid", "encoder", "backbone", "membership", "inference")},
     )  # fmt: skip
-    torch.save({"most": describe(parts, TAXONOMY, 2), "most_epochs": 4, "state_dict": {}}, tmp_path / "last.ckpt")
+    torch.save(
+        {"most": describe(parts, TAXONOMY, 2), "most_stage": "detection", "most_epochs": 4, "state_dict": {}},
+        tmp_path / "last.ckpt",
+    )
     return made
 
 
@@ -43,8 +48,8 @@ def test_another_window_may_not(config):
 
 
 def test_another_length_may_not(config):
-    config.stage.epochs = 8
-    with pytest.raises(ConfigError, match=r"stage\.epochs: expected 4, .*found 8"):
+    config.stage.detection.epochs = 8
+    with pytest.raises(ConfigError, match=r"stage\.detection\.epochs: expected 4, .*found 8"):
         check_resume(config, TAXONOMY)
 
 

@@ -1,0 +1,42 @@
+"""Set reports side by side: ``python -m most.compare 'reports={nearest: a.json, full: b.json}'``."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import hydra
+from omegaconf import DictConfig
+
+from most.config import conf_dir, register, store_root, typed
+from most.entry import run
+from most.errors import ConfigError
+from most.metrics.report import format_comparison, read_report
+
+
+@dataclass
+class CompareConfig:
+    """What ``most.compare`` is told."""
+
+    reports: dict[str, str] = field(default_factory=dict)  # a name for each file that most.evaluate or most.train wrote
+
+    def __post_init__(self) -> None:
+        if not self.reports:
+            raise ConfigError("reports: expected names and files, such as 'reports={a: a.json, b: b.json}', found none")
+
+
+register()
+store_root("compare", CompareConfig)
+
+
+def compare(config: CompareConfig) -> None:
+    """Print a line for each report."""
+    print(format_comparison({name: read_report(Path(path)) for name, path in config.reports.items()}))
+
+
+@hydra.main(version_base=None, config_path=str(conf_dir()), config_name="compare")
+def main(config: DictConfig) -> None:
+    """Compose, check, compare."""
+    run(lambda: compare(typed(config)))
+
+
+if __name__ == "__main__":
+    main()

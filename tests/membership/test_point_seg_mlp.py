@@ -1,0 +1,119 @@
+"""PointSegMLP: what it sees, and that it learns what the nearest centre gets wrong."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from most.errors import ConfigError
+from most.inference import Prediction
+from most.membership import Channels, Evidence, Pairs, PointSegMLPSettings, RegionOfInterest
+from most.metrics.membership import membership_counts
+from most.simulation.scene import Scene
+from most.simulation.sensor import directions
+from most.simulation.settings import SensorSettings
+from most.simulation.vehicles import car
+from most.stages.membership import MembershipStage, MembershipTraining
+from most.structures import Detections, Sample
+from tiny import CAR, TAXONOMY, labelled, tiny_predictor
+
+
+def touching_cars() -> Sample:
+    """One car broadside, the other end-on at its bumper (a T), as a 64-beam lidar 1.7 m above the road sees them."""
+    rng = np.random.default_rng(3)
+    broadside = car(rng).moved(np.array([0.0, 3.2, -1.7]))
+    end_on = car(rng).moved(np.array([3.05, 3.6, -1.7]), np.pi / 2)
+    rays = directions(SensorSettings(columns=512), 0.0)
+    hits = Scene([broadside, end_on], [1, 2], [1.0, 1.0]).cast(np.zeros(3), rays)
+    seen = np.isfinite(hits.distance)
+    points = torch.from_numpy(rays[seen] * hits.distance[seen, None]).float()
+    instance = torch.from_numpy(hits.label[seen].astype(np.int64))
+    return labelled(points, torch.full((len(points),), CAR), instance)
+
+
+def known_evidence(sample: Sample) -> Evidence:
+    """What an untrained stage 1 makes of a window, but for classes and detections: those are the truth's."""
+    truth = sample.instances
+    scores = torch.linspace(0.9, 0.5, len(truth))
+    found = Detections(truth.classes, scores, truth.centres, truth.extents, truth.velocities)
+    predictor = tiny_predictor()
+    predictor.network.eval()
+    with torch.no_grad():
+        (evidence,) = predictor.see([sample])
+    return replace(evidence, semantics=sample.semantics, detections=found)
+
+
+def accuracy(prediction: Prediction, sample: Sample) -> float:
+    """Membership accuracy of one sweep."""
+    counts = membership_counts(
+        sample.points[:, :3], prediction.panoptic.semantics, sample.semantics, sample.labels, prediction.detections,
+        prediction.roi, prediction.claimed, sample.instances,
+    )  # fmt: skip
+    return counts.accuracies()["membership_accuracy"]
+
+
+def stage(settings: PointSegMLPSettings | None = None) -> MembershipStage:
+    predictor = tiny_predictor()
+    channels = Channels(TAXONOMY.num_classes - 1, list(TAXONOMY.things), 4, 8)
+    torch.manual_seed(0)
+    mlp = (settings or PointSegMLPSettings([16, 16])).build(channels)
+    return MembershipStage(predictor, mlp, TAXONOMY, MembershipTraining(), {"format": 1})
+
+
+@pytest.mark.parametrize(("bev", "point"), [(True, True), (True, False), (False, False)])
+def test_it_learns_the_border_between_touching_cars_that_the_nearest_centre_gets_wrong(bev: bool, point: bool) -> None:
+    sample = touching_cars()
+    evidence, made = known_evidence(sample), stage(PointSegMLPSettings([32, 32], bev, point)).train()
+    assert accuracy(made.baseline.fuse(evidence), sample) < 0.95
+    optimiser = torch.optim.SGD(made.membership.parameters(), lr=0.05, momentum=0.9)
+    for _ in range(150):
+        optimiser.zero_grad()
+        made.loss([evidence], [sample]).backward()
+        optimiser.step()
+    made.eval()
+    with torch.no_grad():
+        assert accuracy(made.predictor.fuse(evidence), sample) >= 0.99
+
+
+def test_no_weight_or_statistic_of_stage_1_changes() -> None:
+    made, sample = stage(), touching_cars()
+    before = {key: value.clone() for key, value in made.network.state_dict().items()}
+    made.log = lambda *_, **__: None
+    made.train()
+    (optimiser,) = [made.configure_optimizers()]
+    for _ in range(3):
+        optimiser.zero_grad()
+        made.training_step([sample], 0).backward()
+        optimiser.step()
+    assert not made.network.training
+    assert not any(weight.requires_grad or weight.grad is not None for weight in made.network.parameters())
+    assert all(torch.equal(value, before[key]) for key, value in made.network.state_dict().items())
+
+
+def test_pairs_do_not_depend_on_each_other_once_trained() -> None:
+    sample = touching_cars()
+    evidence, mlp = known_evidence(sample), stage().membership.eval()
+    pairs = RegionOfInterest().pairs(evidence.points, evidence.semantics, evidence.detections)
+    some = torch.randperm(len(pairs), generator=torch.Generator().manual_seed(0))[:100]
+    with torch.no_grad():
+        torch.testing.assert_close(mlp(evidence, pairs)[some], mlp(evidence, pairs.select(some)))
+        confidence = mlp(evidence, pairs)
+    assert ((confidence >= 0) & (confidence <= 1)).all()
+
+
+def test_without_pairs_there_is_nothing_to_rate_or_to_learn() -> None:
+    sample = touching_cars()
+    evidence, made = known_evidence(sample), stage()
+    nothing = replace(evidence, detections=evidence.detections.select(torch.zeros(0, dtype=torch.long)))
+    none = Pairs(torch.zeros(0, dtype=torch.long), torch.zeros(0, dtype=torch.long))
+    assert len(made.membership(nothing, none)) == 0
+    loss = made.loss([nothing], [sample])
+    loss.backward()
+    assert loss == 0
+
+
+@pytest.mark.parametrize("widths", [[], [0], [8, -1]])
+def test_impossible_widths_are_refused(widths: list[int]) -> None:
+    with pytest.raises(ConfigError, match=r"membership\.widths: expected at least one positive width"):
+        PointSegMLPSettings(widths)
