@@ -1,4 +1,4 @@
-"""What all commands share: a user's mistake ends in one message and exit code 2."""
+"""What all commands share: what a user can put right ends in one message, and a mistake in exit code 2."""
 
 import sys
 from collections.abc import Callable
@@ -12,4 +12,4 @@ def run(task: Callable[[], None]) -> None:
         task()
     except MostError as error:
         print(f"most: {error}", file=sys.stderr)
-        sys.exit(2)
+        sys.exit(error.exit_code)

@@ -2,7 +2,9 @@
 
 
 class MostError(Exception):
-    """Base of all errors a user can put right; entry points print its message alone and exit with code 2."""
+    """Base of all errors a user can put right; entry points print its message alone and exit with this code."""
+
+    exit_code = 2
 
 
 class ConfigError(MostError):
@@ -11,3 +13,9 @@ class ConfigError(MostError):
 
 class DataError(MostError):
     """A file or folder that is missing or does not hold what its format says."""
+
+
+class StoppedError(MostError):
+    """The user stopped the work; the message says how to go on."""
+
+    exit_code = 130  # as shells report SIGINT

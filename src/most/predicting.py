@@ -12,7 +12,7 @@ from most.datasets.labels import read_labels, write_labels
 from most.datasets.reader import Frame, Reader
 from most.datasets.taxonomy import Taxonomy
 from most.errors import DataError
-from most.files import atomic_write
+from most.files import atomic_write, is_partial
 from most.inference import Prediction, Predictor
 from most.metrics.assignments import Assignments, assignments_path, read_assignments, write_assignments
 from most.structures import Panoptic, Sample
@@ -33,7 +33,7 @@ def claim_folder(out: Path, checkpoint: Path, reader: Reader, split: str, member
     if out.exists() and not out.is_dir():
         raise DataError(f"{out}: expected a new or empty folder, found a file; choose another out")
     if not path.is_file():
-        if out.is_dir() and any(out.iterdir()):
+        if out.is_dir() and any(not is_partial(path) for path in out.iterdir()):
             raise DataError(f"{out}: expected a new or empty folder, found other files; choose another out")
         with atomic_write(path, "w") as file:
             file.write(record)

@@ -57,7 +57,8 @@ def run_stage(name: str, config: Config, data: SemanticKITTIDataModule, folder: 
     trainer.fit(stage, datamodule=data, ckpt_path=resume, weights_only=True)
     if stage.report.get("epochs") != stage.training_settings.epochs:
         trainer.validate(stage, datamodule=data, verbose=False)
-    write_report(folder / "metrics.json", stage.report)
+    if trainer.is_global_zero:
+        write_report(folder / "metrics.json", stage.report)
 
 
 @hydra.main(version_base=None, config_path=str(conf_dir()), config_name="train")

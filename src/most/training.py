@@ -1,7 +1,7 @@
 """A training run put together: stages, trainer, callbacks, logger."""
 
+import math
 from pathlib import Path
-from typing import Any
 
 import lightning as L
 import torch
@@ -16,6 +16,7 @@ from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError
 from most.membership import Nearest, PointSegMLP
 from most.stages.callbacks import Throughput
+from most.stages.checkpoints import AtomicCheckpointIO, LastCheckpoint
 from most.stages.detection import DetectionStage
 from most.stages.membership import MembershipStage
 from most.viz.callback import BevPictures
@@ -30,7 +31,17 @@ def build_detection(config: Config, data: SemanticKITTIDataModule) -> DetectionS
     training = config.stage.detection
     balanced = training.losses.class_balance > 0
     counts = class_counts(data.reader, "train") if balanced else torch.ones(taxonomy.num_classes, dtype=torch.long)
-    return DetectionStage(predictor, taxonomy, counts, training, describe(parts, taxonomy, config.dataset.sweeps))
+    description = describe(parts, taxonomy, config.dataset.sweeps)
+    steps = training.epochs * steps_per_epoch(config, len(data.reader.frames("train")))
+    return DetectionStage(predictor, taxonomy, counts, training, description, steps)
+
+
+def steps_per_epoch(config: Config, scans: int) -> int:
+    """Return the optimiser's steps in an epoch of stage 1; Lightning's own count would make the loaders too early."""
+    batches = math.ceil(math.ceil(scans / config.trainer.processes()) / config.dataset.batch_size)
+    return math.ceil(
+        batches / config.trainer.accumulated(config.stage.detection.batch_size, config.dataset.batch_size, "detection")
+    )
 
 
 def build_membership_stage(config: Config, stage1: Path, taxonomy: Taxonomy) -> MembershipStage:
@@ -61,8 +72,9 @@ def build_trainer(config: Config, stage: Stage, folder: Path, logger: Logger | b
     settings, training = config.trainer, stage.training_settings
     return L.Trainer(
         accelerator=settings.accelerator,
-        devices=1,
-        precision=settings.precision,
+        devices=settings.devices,
+        strategy=settings.strategy,
+        precision=settings.chosen_precision(),
         max_epochs=training.epochs,
         accumulate_grad_batches=settings.accumulated(training.batch_size, config.dataset.batch_size, stage.name),
         gradient_clip_val=training.clip,
@@ -72,6 +84,7 @@ def build_trainer(config: Config, stage: Stage, folder: Path, logger: Logger | b
         use_distributed_sampler=False,
         logger=logger,
         callbacks=_callbacks(config, stage, folder),
+        plugins=[AtomicCheckpointIO()],
         enable_progress_bar=settings.progress_bar,
         enable_model_summary=False,
         default_root_dir=folder,
@@ -79,14 +92,12 @@ def build_trainer(config: Config, stage: Stage, folder: Path, logger: Logger | b
 
 
 def _callbacks(config: Config, stage: Stage, folder: Path) -> list[Callback]:
-    def keep(which: str, **when: Any) -> ModelCheckpoint:
-        """Keep one file; a run that goes on in its folder overwrites it."""
-        path = checkpoint_path(folder, stage.name, which)
-        return ModelCheckpoint(path.parent, path.stem, enable_version_counter=False, **when)
-
+    best, last = (checkpoint_path(folder, stage.name, which) for which in ("best", "last"))
     callbacks: list[Callback] = [
-        keep("last", every_n_epochs=1, save_on_train_epoch_end=True),
-        keep("best", monitor=f"{stage.prefix}val/pq", mode="max"),
+        ModelCheckpoint(
+            best.parent, best.stem, monitor=f"{stage.prefix}val/pq", mode="max", enable_version_counter=False
+        ),
+        LastCheckpoint(last, config.trainer.save_every),
         Throughput(stage.prefix),
     ]
     if config.logger.kind != "none":

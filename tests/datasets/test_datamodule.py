@@ -1,13 +1,15 @@
+from contextlib import nullcontext
 from pathlib import Path
 
 import lightning as L
 import pytest
 import torch
+from lightning.pytorch.callbacks import Callback
 from omegaconf import OmegaConf
 
 from most.datasets.augment import Augment
 from most.datasets.datamodule import SemanticKITTIDataModule, SemanticKITTISettings
-from most.datasets.sampler import EpochSampler
+from most.datasets.sampler import EpochSampler, OrderedSampler
 from most.datasets.semantickitti import Splits
 from most.errors import ConfigError, DataError
 from most.modal.extent import ShrinkWrap
@@ -76,6 +78,26 @@ def test_processes_share_an_epoch_evenly(tree: Path) -> None:
     assert {index for share in shares for index in share} == {0, 1, 2, 3}
 
 
+def test_processes_share_a_split_in_order_and_no_sample_twice(tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    dataset = module(tree).dataset("train")
+    shares = []
+    for rank in range(3):
+        monkeypatch.setattr("most.datasets.sampler._rank", lambda rank=rank: rank)
+        monkeypatch.setattr("most.datasets.sampler.processes", lambda: 3)
+        shares.append(list(OrderedSampler(dataset)))
+        assert len(OrderedSampler(dataset)) == len(shares[-1])
+    assert shares == [[0, 3], [1], [2]]
+
+
+def test_an_epoch_goes_on_behind_what_was_done_and_the_next_is_whole(tree: Path) -> None:
+    dataset = module(tree).dataset("train")
+    whole = list(EpochSampler(dataset, 0, 2))
+    sampler = EpochSampler(dataset, 0, 2, done=3)
+    assert len(sampler) == 4
+    assert list(sampler) == whole[3:]
+    assert list(sampler) == whole
+
+
 class Recorder(L.LightningModule):
     """Remembers what it was shown."""
 
@@ -92,19 +114,34 @@ class Recorder(L.LightningModule):
         return torch.optim.SGD(self.parameters(), lr=0.1)
 
 
-def fit(tree: Path, folder: Path, epochs: int, resume: Path | None = None) -> list[tuple[int, int, float]]:
+class SaveAfter(Callback):
+    """Saves after a number of steps, and stops there as abruptly as a crash."""
+
+    def __init__(self, steps: int, path: Path) -> None:
+        self.steps, self.path = steps, path
+
+    def on_train_batch_end(self, trainer: L.Trainer, *_: object) -> None:
+        if trainer.global_step == self.steps:
+            trainer.save_checkpoint(self.path)
+            raise RuntimeError("crash")
+
+
+def fit(tree: Path, folder: Path, callback: Callback | None = None, resume: Path | None = None) -> list:
     quiet = {"logger": False, "enable_progress_bar": False, "enable_model_summary": False, "accelerator": "cpu"}
-    trainer = L.Trainer(max_epochs=epochs, default_root_dir=folder, enable_checkpointing=False, **quiet)
+    callbacks = [callback] if callback else []
+    trainer = L.Trainer(max_epochs=3, default_root_dir=folder, enable_checkpointing=False, callbacks=callbacks, **quiet)
     recorder = Recorder()
-    trainer.fit(recorder, datamodule=module(tree, workers=2), ckpt_path=resume)
-    trainer.save_checkpoint(folder / f"{epochs}.ckpt")
+    with pytest.raises(RuntimeError, match="crash") if callback else nullcontext():
+        trainer.fit(recorder, datamodule=module(tree, workers=2), ckpt_path=resume, weights_only=True)
     return recorder.seen
 
 
-def test_resumed_run_sees_what_it_would_have_seen(tree: Path, tmp_path: Path) -> None:
-    whole = fit(tree, tmp_path / "whole", 3)
-    first = fit(tree, tmp_path / "parts", 1)
-    rest = fit(tree, tmp_path / "parts", 3, tmp_path / "parts" / "1.ckpt")
+@pytest.mark.parametrize("steps", [1, 3, 4, 5, 8])  # within and at the end of epochs of 4 steps
+def test_resumed_run_sees_what_it_would_have_seen(tree: Path, tmp_path: Path, steps: int) -> None:
+    whole = fit(tree, tmp_path)
+    first = fit(tree, tmp_path, SaveAfter(steps, tmp_path / "state.ckpt"))
+    rest = fit(tree, tmp_path, resume=tmp_path / "state.ckpt")
+    assert len(first) == steps
     assert first + rest == whole
     assert len({tuple(sorted(seen[1:] for seen in whole if seen[0] == epoch)) for epoch in range(3)}) == 3
 

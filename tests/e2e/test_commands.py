@@ -1,7 +1,6 @@
 """The whole way through the real commands, as a newcomer would type them: simulate, train, predict, evaluate, draw."""
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -9,46 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from commands import SIMULATE, SPLITS, TRAIN, most
+
 MODEL = "run/checkpoints/membership-last.ckpt"
-TINY = [
-    "grid.voxel_size=[0.4,0.4,0.4]",
-    "backbone.widths=[4,4,8,8]",
-    "backbone.bev_channels=8",
-    "encoder.widths=[8,4]",
-    "heads.centre.channels=8",
-    "stage.detection.epochs=2",
-    "stage.detection.batch_size=2",
-    "stage.membership.epochs=2",
-    "stage.membership.batch_size=1",
-    "membership.widths=[4,4]",
-    "trainer.validate_every=3",  # never during the two epochs: the last weights are scored all the same
-    "trainer.threads=1",
-    "trainer.log_every=1",
-    "dataset.workers=0",
-]
-SPLITS = ["dataset.splits.train=['00']", "dataset.splits.val=['01']", "dataset.splits.test=['11']"]
-
-
-def most(folder: Path, command: str, *arguments: str) -> subprocess.CompletedProcess:
-    """Run a command in ``folder``, W&B's own files too."""
-    places = {f"WANDB_{name}": str(folder / "wandb") for name in ("DIR", "DATA_DIR", "CACHE_DIR", "CONFIG_DIR")}
-    return subprocess.run(
-        [sys.executable, "-m", f"most.{command}", *arguments],
-        cwd=folder, env=os.environ | places | {"OMP_NUM_THREADS": "1"}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> Path:
     """A folder in which two sequences were simulated and a tiny network was trained."""
     folder = tmp_path_factory.mktemp("run")
-    steps = [
-        ("simulate", "simulation=demo", "out=streets", "simulation.sequences=['00','01']", "simulation.scans=3",
-         "simulation.sensor.columns=256"),
-        ("train", "+experiment=sim_demo", "dataset.root=streets", "dataset.tables=tables", "hydra.run.dir=run",
-         *SPLITS, *TINY),
-    ]  # fmt: skip
-    for command, *arguments in steps:
+    for command, *arguments in [("simulate", *SIMULATE), ("train", *TRAIN, "hydra.run.dir=run")]:
         done = most(folder, command, *arguments)
         assert done.returncode == 0, done.stderr
     return folder
@@ -132,8 +101,7 @@ def test_prediction_goes_on_where_it_stopped_and_refuses_another_models_folder(r
 
 
 def test_a_run_does_not_go_on_with_another_length_or_from_another_model(run):
-    arguments = ["+experiment=sim_demo", "dataset.root=streets", f"resume={MODEL}",
-                 "hydra.run.dir=other", *SPLITS, *TINY]  # fmt: skip
+    arguments = [*TRAIN, f"resume={MODEL}", "hydra.run.dir=other"]
     longer = most(run, "train", *arguments, "stage.membership.epochs=3")
     assert longer.returncode == 2
     assert "stage.membership.epochs: expected 2" in longer.stderr

@@ -3,12 +3,12 @@
 from dataclasses import dataclass, field
 
 import lightning as L
-from torch.utils.data import DataLoader, SequentialSampler
+from torch.utils.data import DataLoader
 
 from most.datasets.augment import Augment
 from most.datasets.dataset import WindowDataset
 from most.datasets.instances import InstanceTables
-from most.datasets.sampler import EpochSampler
+from most.datasets.sampler import EpochSampler, OrderedSampler
 from most.datasets.semantickitti import SemanticKITTI, Splits
 from most.errors import ConfigError
 from most.modal.instances import ExtentStrategy
@@ -31,6 +31,17 @@ class SemanticKITTISettings:
         for key, lowest in {"sweeps": 0, "batch_size": 1, "workers": 0}.items():
             if getattr(self, key) < lowest:
                 raise ConfigError(f"dataset.{key}: expected at least {lowest}, found {getattr(self, key)}")
+
+
+def standing(trainer: L.Trainer) -> tuple[int, int]:
+    """Return the epoch that a trainer, resumed or not, is about to run, and how many of its batches it has behind it.
+
+    A state that was saved after the last batch of an epoch counts as the beginning of the next one.
+    """
+    epochs, batches = trainer.fit_loop.epoch_progress.current, trainer.fit_loop.epoch_loop.batch_progress
+    if batches.is_last_batch:
+        return epochs.ready, 0
+    return epochs.processed, batches.current.processed
 
 
 class SemanticKITTIDataModule(L.LightningDataModule):
@@ -63,10 +74,10 @@ class SemanticKITTIDataModule(L.LightningDataModule):
         return WindowDataset(self.reader, frames, settings.sweeps, augment, self.instances, self.seed, settings.cache)
 
     def train_dataloader(self) -> DataLoader[Sample]:
-        """Shuffled, augmented windows, from the trainer's epoch on."""
+        """Shuffled, augmented windows, from where the trainer stands on."""
         dataset = self.dataset("train", self.augment)
-        epoch = self.trainer.current_epoch if self.trainer else 0
-        return self._loader(dataset, EpochSampler(dataset, self.seed, epoch))
+        epoch, batches = standing(self.trainer) if self.trainer else (0, 0)
+        return self._loader(dataset, EpochSampler(dataset, self.seed, epoch, batches * self.settings.batch_size))
 
     def val_dataloader(self) -> DataLoader[Sample]:
         """The validation split in order."""
@@ -83,9 +94,9 @@ class SemanticKITTIDataModule(L.LightningDataModule):
     def loader(self, split: str) -> DataLoader[Sample]:
         """Any split in order, not augmented."""
         dataset = self.dataset(split)
-        return self._loader(dataset, SequentialSampler(dataset))
+        return self._loader(dataset, OrderedSampler(dataset))
 
-    def _loader(self, dataset: WindowDataset, sampler: EpochSampler | SequentialSampler) -> DataLoader[Sample]:
+    def _loader(self, dataset: WindowDataset, sampler: EpochSampler | OrderedSampler) -> DataLoader[Sample]:
         return DataLoader(
             dataset,
             self.settings.batch_size,

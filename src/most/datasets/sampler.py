@@ -7,6 +7,20 @@ from torch import distributed
 from torch.utils.data import Sampler
 
 from most.datasets.dataset import WindowDataset
+from most.processes import processes
+
+
+class OrderedSampler(Sampler[int]):
+    """A dataset in order, shared out among the processes of a distributed run: none twice, so shares may be uneven."""
+
+    def __init__(self, dataset: WindowDataset) -> None:
+        self.indices = range(len(dataset))[_rank() :: processes()]
+
+    def __len__(self) -> int:
+        return len(self.indices)
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self.indices)
 
 
 class EpochSampler(Sampler[int]):
@@ -16,12 +30,12 @@ class EpochSampler(Sampler[int]):
     samples evenly, a few are seen twice: all processes must take the same number of steps.
     """
 
-    def __init__(self, dataset: WindowDataset, seed: int, epoch: int = 0) -> None:
+    def __init__(self, dataset: WindowDataset, seed: int, epoch: int = 0, done: int = 0) -> None:
+        """Begin at ``epoch``, the first ``done`` samples of which (of this process) were seen before."""
         self.dataset = dataset
         self.seed = seed
-        joined = distributed.is_available() and distributed.is_initialized()
-        self.rank = distributed.get_rank() if joined else 0
-        self.processes = distributed.get_world_size() if joined else 1
+        self.done = done
+        self.rank, self.processes = _rank(), processes()
         self.set_epoch(epoch)
 
     def set_epoch(self, epoch: int) -> None:
@@ -35,4 +49,9 @@ class EpochSampler(Sampler[int]):
     def __iter__(self) -> Iterator[int]:
         order = np.random.default_rng([self.seed, self.epoch]).permutation(len(self.dataset))
         share = np.arange(self.rank, len(self) * self.processes, self.processes) % len(self.dataset)
-        return iter(order[share].tolist())
+        done, self.done = self.done, 0
+        return iter(order[share][done:].tolist())
+
+
+def _rank() -> int:
+    return distributed.get_rank() if processes() > 1 else 0

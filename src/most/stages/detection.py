@@ -63,8 +63,9 @@ class DetectionStage(L.LightningModule):
         class_counts: Int64[Tensor, "classes"],
         training: DetectionTraining,
         description: dict[str, Any],
+        steps: int = 1,
     ) -> None:
-        """``class_counts`` are the training split's points of each class, void first.
+        """``class_counts`` are the training split's points of each class, void first; ``steps`` the optimiser's to come.
 
         ``description`` goes into the checkpoints: plain types that say how to make the network again.
         """
@@ -74,6 +75,7 @@ class DetectionStage(L.LightningModule):
         self.taxonomy = taxonomy
         self.training_settings = training
         self.description = description
+        self.steps = steps
         weights = class_weights(class_counts[1:], training.losses.class_balance)
         self.register_buffer("class_weights", weights, persistent=False)
         self.scores = Scores(taxonomy)
@@ -108,7 +110,7 @@ class DetectionStage(L.LightningModule):
         weights = self.training_settings.losses
         total = torch.stack([getattr(weights, name) * loss for name, loss in losses.items()]).sum()
         logged = {f"train/loss_{name}": loss.detach() for name, loss in losses.items()}
-        self.log_dict(logged | {"train/loss": total.detach()}, batch_size=len(samples))
+        self.log_dict(logged | {"train/loss": total.detach()}, batch_size=len(samples), sync_dist=True)
         return total
 
     def validation_step(self, samples: list[Sample], _: int) -> dict[str, Any]:
@@ -136,8 +138,7 @@ class DetectionStage(L.LightningModule):
 
     def configure_optimizers(self) -> OptimizerLRSchedulerConfig:
         """See :func:`one_cycle`."""
-        steps = int(self.trainer.estimated_stepping_batches)
-        optimizer, schedule = one_cycle(self.network.parameters(), self.training_settings, steps)
+        optimizer, schedule = one_cycle(self.network.parameters(), self.training_settings, self.steps)
         return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
 
 

@@ -92,7 +92,7 @@ class MembershipStage(L.LightningModule):
         with torch.no_grad():
             evidence = self.predictor.see(samples)
         loss = self.loss(evidence, samples)
-        self.log(f"{self.prefix}train/loss", loss.detach(), batch_size=len(samples))
+        self.log(f"{self.prefix}train/loss", loss.detach(), batch_size=len(samples), sync_dist=True)
         return loss
 
     def validation_step(self, samples: list[Sample], _: int) -> dict[str, Any]:

@@ -1,0 +1,108 @@
+"""Checkpoints that a run goes on from exactly: after an epoch, every few minutes, and when it is interrupted.
+
+They are taken between two optimiser steps, so that no accumulated gradient is lost, and written beside and renamed.
+"""
+
+import signal
+import threading
+import time
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import lightning as L
+import torch
+from lightning.fabric.plugins.io.torch_io import TorchCheckpointIO
+from lightning.pytorch.callbacks import Callback
+
+from most.errors import DataError, StoppedError
+from most.files import atomic_write
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class AtomicCheckpointIO(TorchCheckpointIO):
+    """A killed run, or a full disk, leaves the checkpoint that was there before."""
+
+    def save_checkpoint(self, checkpoint: dict[str, Any], path: str | Path, storage_options: Any = None) -> None:
+        """Write a checkpoint; DataError where that is impossible."""
+        try:
+            with atomic_write(Path(path)) as file:
+                torch.save(checkpoint, file)
+        except (OSError, RuntimeError) as error:  # torch's writer turns a full disk into the latter
+            raise DataError(f"{path}: expected a place to write the checkpoint, found {error}; make room") from error
+
+
+class LastCheckpoint(Callback):
+    """Keeps the newest state of a stage at ``path``.
+
+    The first SIGINT or SIGTERM lets the step end, saves, and raises ``StoppedError``; another one is as abrupt as ever.
+    """
+
+    def __init__(self, path: Path, minutes: float) -> None:
+        """``minutes`` between two checkpoints within an epoch."""
+        self.path = path
+        self.seconds = 60 * minutes
+        self.saved = 0.0
+        self.asked = False
+        self.former: dict[int, Any] = {}
+
+    def on_train_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """Listen for signals."""
+        self.saved = time.monotonic()
+        if threading.current_thread() is threading.main_thread():
+            self.former = {number: signal.signal(number, self._ask) for number in SIGNALS}
+
+    def on_train_batch_end(
+        self, trainer: L.Trainer, pl_module: L.LightningModule, outputs: Any, batch: Any, batch_idx: int
+    ) -> None:
+        """Save when it is time to."""
+        if (batch_idx + 1) % trainer.accumulate_grad_batches and not trainer.is_last_batch:
+            return
+        asked, due = self._agreed(trainer, self.asked), time.monotonic() - self.saved > self.seconds
+        if asked or self._agreed(trainer, due):
+            self._save(trainer)
+        if asked:
+            raise self._stopped()
+
+    def on_validation_batch_end(self, trainer: L.Trainer, *_: Any) -> None:
+        """Stop between two sweeps; what the epoch reached was saved when validation began.
+
+        Several processes stop after their next training step instead: their shares of the sweeps may be uneven.
+        """
+        if trainer.state.fn == "fit" and self.asked and trainer.world_size == 1:
+            raise self._stopped()
+
+    def on_validation_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """Keep what the epoch reached."""
+        if trainer.state.fn == "fit" and not trainer.sanity_checking:
+            self._save(trainer)
+
+    def on_train_epoch_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """Keep what the epoch reached."""
+        self._save(trainer)
+
+    def teardown(self, trainer: L.Trainer, pl_module: L.LightningModule, stage: str) -> None:
+        """Leave signals as they were."""
+        for number, handler in self.former.items():
+            signal.signal(number, handler)
+        self.former = {}
+
+    def _ask(self, number: int, frame: FrameType | None) -> None:
+        if self.asked:
+            raise KeyboardInterrupt
+        self.asked = True
+        print("\nmost: stopping after this step; once more to stop at once", flush=True)
+
+    def _stopped(self) -> StoppedError:
+        return StoppedError(
+            f"interrupted; to go on, repeat the command with resume={self.path} hydra.run.dir={self.path.parents[1]}"
+        )
+
+    def _agreed(self, trainer: L.Trainer, wish: bool) -> bool:
+        """Whether any process wishes it; all of them must save together."""
+        return trainer.strategy.reduce_boolean_decision(wish, all=False)
+
+    def _save(self, trainer: L.Trainer) -> None:
+        trainer.save_checkpoint(self.path)
+        self.saved = time.monotonic()
