@@ -7,7 +7,7 @@ import hydra
 from omegaconf import DictConfig
 
 from most.config import conf_dir, register, store_root, typed
-from most.entry import run
+from most.entry import run, start
 from most.errors import ConfigError
 from most.metrics.report import format_comparison, read_report
 
@@ -39,4 +39,4 @@ def main(config: DictConfig) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    start(main)

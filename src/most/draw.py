@@ -12,7 +12,7 @@ from most.config import conf_dir, register, store_root, typed
 from most.datasets.dataset import WindowDataset
 from most.datasets.reader import Frame, Reader
 from most.datasets.semantickitti import SemanticKITTI
-from most.entry import run
+from most.entry import run, start
 from most.geometry.similarity import Similarity
 from most.modal.build import LabelRules, build_table
 from most.modal.extent import ShrinkWrap
@@ -61,4 +61,4 @@ def main(config: DictConfig) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    start(main)

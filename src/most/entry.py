@@ -1,9 +1,25 @@
 """What all commands share: what a user can put right ends in one message, and a mistake in exit code 2."""
 
+import errno
+import os
 import sys
 from collections.abc import Callable
 
+from hydra.errors import HydraException
+from omegaconf.errors import OmegaConfBaseException
+
 from most.errors import MostError
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM)
+
+
+def start(main: Callable[[], None]) -> None:
+    """Run a command's main function: a configuration that does not compose is a mistake as well."""
+    os.environ.setdefault("HYDRA_FULL_ERROR", "1")  # else Hydra shortens every error, those of the program too
+    try:
+        main()
+    except (HydraException, OmegaConfBaseException) as error:
+        _end(str(error), 2)
 
 
 def run(task: Callable[[], None]) -> None:
@@ -11,5 +27,20 @@ def run(task: Callable[[], None]) -> None:
     try:
         task()
     except MostError as error:
-        print(f"most: {error}", file=sys.stderr)
-        sys.exit(error.exit_code)
+        _end(_message(error), error.exit_code)
+    except OSError as error:
+        if error.errno not in NO_ROOM:
+            raise
+        place = error.filename or "the output folder"
+        _end(f"{place}: expected to be able to write, found {error.strerror}; make room or choose another folder", 2)
+
+
+def _message(error: MostError) -> str:
+    """The error's own text, also where a loading process sent it here inside its traceback."""
+    text, name = str(error), type(error).__name__
+    return text.rsplit(f"{name}: ", 1)[1].strip() if "Original Traceback" in text else text
+
+
+def _end(message: str, code: int) -> None:
+    print(f"most: {message}", file=sys.stderr)
+    sys.exit(code)

@@ -10,7 +10,7 @@ from omegaconf import MISSING, DictConfig
 from most.config import conf_dir, register, store_root, typed
 from most.datasets.labels import read_labels
 from most.datasets.semantickitti import SemanticKITTI
-from most.entry import run
+from most.entry import run, start
 from most.metrics.folders import evaluate_folder
 from most.metrics.report import format_table, write_report
 
@@ -46,4 +46,4 @@ def main(config: DictConfig) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    start(main)

@@ -13,7 +13,7 @@ from most.assembly import load_trained
 from most.config import conf_dir, register, store_root, typed
 from most.datasets.dataset import WindowDataset
 from most.datasets.semantickitti import SemanticKITTI
-from most.entry import run
+from most.entry import run, start
 from most.errors import ConfigError
 from most.membership import Nearest
 from most.predicting import claim_folder, unfinished, write_predictions
@@ -63,4 +63,4 @@ def main(config: DictConfig) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    start(main)

@@ -12,13 +12,24 @@ from most.membership import Nearest
 STAGE1 = ("grid", "encoder", "backbone", "centre_head", "semantic_head")
 
 
-def stages_to_run(config: Config, taxonomy: Taxonomy) -> list[str]:
-    """Return the stages still to be trained; a configuration or checkpoint that does not fit is a ConfigError."""
+def stages_to_run(config: Config, taxonomy: Taxonomy, folder: Path) -> list[str]:
+    """Return the stages still to be trained; what does not fit is a ConfigError."""
     names: list[str] = config.stage.run
+    check_folder(config, folder)
     if config.resume:
         return names[names.index(check_resume(config, taxonomy)) :]
     check_stage1(config, taxonomy)
     return names
+
+
+def check_folder(config: Config, folder: Path) -> None:
+    """Refuse a folder with another run's checkpoints, which would be overwritten."""
+    kept = sorted((folder / "checkpoints").glob("*.ckpt"))
+    if kept and not config.resume:
+        raise ConfigError(
+            f"hydra.run.dir: expected a folder without checkpoints, found {kept[0]}; "
+            f"choose another one, or go on with resume={kept[0]}"
+        )
 
 
 def check_resume(config: Config, taxonomy: Taxonomy) -> str:

@@ -9,7 +9,7 @@ from hydra.core.config_store import ConfigStore
 from omegaconf import DictConfig
 
 from most.config import conf_dir, typed
-from most.entry import run
+from most.entry import run, start
 from most.simulation import SimulationSettings, simulate
 
 
@@ -36,4 +36,4 @@ def _simulate(config: SimulateConfig) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    start(main)

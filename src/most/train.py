@@ -15,7 +15,7 @@ from omegaconf import DictConfig, OmegaConf
 from most.assembly import read_checkpoint
 from most.config import Config, conf_dir, register, typed
 from most.datasets.datamodule import SemanticKITTIDataModule
-from most.entry import run
+from most.entry import run, start
 from most.metrics.report import write_report
 from most.resuming import stages_to_run
 from most.training import Stage, build_detection, build_membership_stage, build_trainer, handed_over
@@ -33,7 +33,7 @@ def train(config: Config, folder: Path) -> None:
     data = SemanticKITTIDataModule(config.dataset, config.augment, config.extent, config.seed)
     for split in ("train", "val"):
         data.reader.sequences(split)  # raises where the dataset is not there, before any work
-    names = stages_to_run(config, data.reader.taxonomy)
+    names = stages_to_run(config, data.reader.taxonomy, folder)
     settings: Any = OmegaConf.to_container(OmegaConf.structured(config))
     try:
         logger = config.logger.build(folder, config.name, settings)
@@ -71,4 +71,4 @@ def main(config: DictConfig) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    start(main)

@@ -65,8 +65,8 @@ def _write_sequence(settings: SimulationSettings, name: str, folder: Path, progr
     world, scans = World(settings, name), []
     for index in range(settings.scans):
         scan = world.scan(index)
-        scan.points.tofile(part / "velodyne" / f"{index:06d}.bin")
-        scan.labels.tofile(part / "labels" / f"{index:06d}.label")
+        (part / "velodyne" / f"{index:06d}.bin").write_bytes(scan.points.tobytes())
+        (part / "labels" / f"{index:06d}.label").write_bytes(scan.labels.tobytes())
         scans.append(scan)
         progress.update()
     np.savez(part / "boxes.npz", **vars(boxes(world, scans)))

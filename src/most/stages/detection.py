@@ -65,8 +65,9 @@ class DetectionStage(L.LightningModule):
         description: dict[str, Any],
         steps: int = 1,
     ) -> None:
-        """``class_counts`` are the training split's points of each class, void first; ``steps`` the optimiser's to come.
+        """``class_counts`` are the training split's points of each class, void first.
 
+        ``steps`` counts those of the optimiser in the whole training.
         ``description`` goes into the checkpoints: plain types that say how to make the network again.
         """
         super().__init__()

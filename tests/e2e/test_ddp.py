@@ -1,0 +1,28 @@
+"""Two real processes, as Lightning starts them, train and validate as one does that takes both their batches."""
+
+import json
+from pathlib import Path
+
+import torch
+
+from commands import SIMULATE, TRAIN, most
+
+TWO = ["trainer=ddp", "trainer.accelerator=cpu", "trainer.devices=2", "logger=none", "logger.pictures=0"]
+
+
+def test_two_processes_train_both_stages_and_count_every_sweep_once(tmp_path: Path) -> None:
+    assert most(tmp_path, "simulate", *SIMULATE, "simulation.scans=4").returncode == 0
+    arguments = [*TRAIN, "trainer.validate_every=1", "trainer.precision=32-true"]
+    for run, extra in {"two": TWO, "one": ["dataset.batch_size=2", "logger=none", "logger.pictures=0"]}.items():
+        done = most(tmp_path, "train", *arguments, *extra, f"hydra.run.dir={run}")
+        assert done.returncode == 0, done.stderr
+    one, two = (json.loads((tmp_path / run / "metrics.json").read_text())["panoptic"] for run in ("one", "two"))
+    for name, figures in one["per_class"].items():  # a sweep counted twice would show
+        assert two["per_class"][name]["tp"] + two["per_class"][name]["fn"] == figures["tp"] + figures["fn"], name
+    first, second = (
+        torch.load(tmp_path / run / "checkpoints/detection-last.ckpt", weights_only=True)["state_dict"]
+        for run in ("one", "two")
+    )
+    assert first.keys() == second.keys()
+    for name, value in first.items():
+        torch.testing.assert_close(second[name], value, rtol=0.01, atol=0.002, msg=name)
