@@ -38,17 +38,17 @@ from most import train
 from most.entry import start
 from most.stages.checkpoints import LastCheckpoint
 
-number, left = int(sys.argv.pop(1)), int(sys.argv.pop(1))
-end = LastCheckpoint.on_train_batch_end
+hook, number, left = sys.argv.pop(1), int(sys.argv.pop(1)), int(sys.argv.pop(1))
+end = getattr(LastCheckpoint, hook)
 
-def on_train_batch_end(self, *arguments):
+def hook_and_signal(self, *arguments):
     global left
-    end(self, *arguments)
     left -= 1
     if left == 0:
-        os.kill(os.getpid(), number)
+        os.killpg(0, number)  # as a terminal does: the loading processes get it too
+    end(self, *arguments)
 
-LastCheckpoint.on_train_batch_end = on_train_batch_end
+setattr(LastCheckpoint, hook, hook_and_signal)
 start(train.main)
 """
 
@@ -58,9 +58,11 @@ def most(folder: Path, command: str, *arguments: str) -> subprocess.CompletedPro
     return python(folder, "-m", f"most.{command}", *arguments)
 
 
-def signalled(folder: Path, number: int, batch: int, *arguments: str) -> subprocess.CompletedProcess:
-    """Train in ``folder``; the process sends itself a signal at the end of its ``batch``-th batch."""
-    return python(folder, "-c", SIGNALLED, str(number), str(batch), *arguments)
+def signalled(
+    folder: Path, number: int, batch: int, *arguments: str, hook: str = "on_train_batch_end"
+) -> subprocess.CompletedProcess:
+    """Train in ``folder``; at the ``batch``-th call of a hook all its processes get a signal."""
+    return python(folder, "-c", SIGNALLED, hook, str(number), str(batch), *arguments)
 
 
 def python(folder: Path, *arguments: str) -> subprocess.CompletedProcess:
@@ -69,6 +71,7 @@ def python(folder: Path, *arguments: str) -> subprocess.CompletedProcess:
     return subprocess.run(
         [sys.executable, *arguments],
         cwd=folder, env=os.environ | places | {"OMP_NUM_THREADS": "1"}, capture_output=True, text=True, check=False,
+        start_new_session=True,
     )  # fmt: skip
 
 

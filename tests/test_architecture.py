@@ -26,7 +26,7 @@ COMPONENTS = {
     "simulation": {"datasets"},
 }
 ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw"}
-OUTER = {"entry", "config", "assembly", "training", "resuming"}
+OUTER = {"entry", "config", "assembly", "training", "checks"}
 
 
 def imported(path):

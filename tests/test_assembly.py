@@ -10,6 +10,7 @@ from most.assembly import FORMAT, describe, load_trained
 from most.backbones import AsymmetricUNetSettings, ResidualUNetSettings
 from most.errors import DataError
 from most.heads import SemanticHead
+from most.membership import PointSegMLPSettings
 from tiny import TAXONOMY, cloud, street, tiny_parts, tiny_predictor, window
 
 SAMPLES = [street(), window(cloud(40), cloud(20, 1))]
@@ -17,9 +18,10 @@ SAMPLES = [street(), window(cloud(40), cloud(20, 1))]
 
 def checkpoint(predictor, **changes):
     """What training saves of a model: its description beside Lightning's own keys."""
-    state = {f"network.{key}": value for key, value in predictor.network.state_dict().items()}
+    parts = predictor.modules().items()
+    state = {f"{name}.{key}": value for name, part in parts for key, value in part.state_dict().items()}
     description = describe(tiny_parts(**changes), TAXONOMY, sweeps=1)
-    return {"epoch": 3, "state_dict": state | {"quality.tp": torch.zeros(20)}, "most": description}
+    return {"epoch": 3, "state_dict": state | {"quality.tp": torch.zeros(20)}, "most": description, "most_run": {}}
 
 
 def save(folder: Path, content) -> Path:
@@ -38,13 +40,15 @@ def tensors(prediction):
         {},
         {"backbone": AsymmetricUNetSettings(widths=[4, 4, 8, 8], bev_channels=8)},
         {"backbone": ResidualUNetSettings(widths=[4, 4, 8, 8], bev_channels=4), "semantic_head": SemanticHead(False)},
+        {"membership": PointSegMLPSettings([4])},
     ],
 )
 def test_a_loaded_model_predicts_bit_for_bit_what_the_saved_one_did(tmp_path, changes):
     predictor = tiny_predictor(**changes)
     predictor.network(SAMPLES)  # moves the batch statistics from where they start
     predictor.network.centre_head.heatmap.bias.data += 2.0  # for some detections
-    predictor.network.eval()
+    for part in predictor.modules().values():
+        part.eval()
     trained = load_trained(save(tmp_path, checkpoint(predictor, **changes)))
     assert (trained.sweeps, trained.taxonomy) == (1, TAXONOMY)
     assert not trained.predictor.network.training
@@ -121,6 +125,7 @@ OTHERS = {
     "another program's": (without("most"), "found one of another program; choose another"),
     "a description of another kind": (setting("most", value=7), "found one of another program"),
     "another format": (setting("most", "format", value=FORMAT + 1), f"format {FORMAT}, found {FORMAT + 1}; load it"),
+    "no run": (without("most_run"), "expected a whole checkpoint, found none of most_run"),
     "no format": (setting("most", "format", value=None), f"format {FORMAT}, found None"),
     "unknown taxonomy": (setting("most", "taxonomy", "name", value="mars"), "found 'mars'.*train it again"),
     "other classes": (

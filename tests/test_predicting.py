@@ -123,15 +123,15 @@ def checkpoint(tmp_path):
 def test_the_same_prediction_goes_on_in_its_folder(tmp_path, checkpoint, reader):
     out = tmp_path / "deep" / "out"
     for _ in range(2):
-        claim_folder(out, checkpoint, reader, "val")
+        claim_folder(out, checkpoint, reader, "val", "trained")
     assert files(out) == ["prediction.json"]
     moved = checkpoint.rename(tmp_path / "renamed.ckpt")  # it is the content that counts
-    claim_folder(out, moved, SemanticKITTI(reader.root, reader.splits), "val")
+    claim_folder(out, moved, SemanticKITTI(reader.root, reader.splits), "val", "trained")
 
 
 def test_another_checkpoint_split_or_dataset_is_refused(tmp_path, checkpoint, reader):
     out = tmp_path / "out"
-    claim_folder(out, checkpoint, reader, "val")
+    claim_folder(out, checkpoint, reader, "val", "trained")
     write_sequence(tmp_path / "elsewhere", "08", range(1))
     others = {
         "split": (SemanticKITTI(reader.root, Splits(val=["08"], test=["08"])), "test"),
@@ -139,25 +139,35 @@ def test_another_checkpoint_split_or_dataset_is_refused(tmp_path, checkpoint, re
     }
     for other in others.values():
         with pytest.raises(DataError, match="holds predictions of another checkpoint, dataset or split; choose anot"):
-            claim_folder(out, checkpoint, *other)
+            claim_folder(out, checkpoint, *other, "trained")
+    with pytest.raises(DataError, match="holds predictions of another checkpoint, membership"):
+        claim_folder(out, checkpoint, reader, "val", "nearest")
     checkpoint.write_bytes(b"other weights")
     with pytest.raises(DataError, match="holds predictions of another checkpoint"):
-        claim_folder(out, checkpoint, reader, "val")
+        claim_folder(out, checkpoint, reader, "val", "trained")
 
 
 def test_a_folder_with_other_files_is_refused_untouched(tmp_path, checkpoint, reader):
     out = tmp_path / "out"
     out.mkdir()
-    claim_folder(out, checkpoint, reader, "val")  # an empty one will do
+    claim_folder(out, checkpoint, reader, "val", "trained")  # an empty one will do
     (out / "prediction.json").rename(out / "thesis.txt")
     with pytest.raises(DataError, match="expected a new or empty folder, found other files; choose another out"):
-        claim_folder(out, checkpoint, reader, "val")
+        claim_folder(out, checkpoint, reader, "val", "trained")
     assert files(out) == ["thesis.txt"]
+
+
+def test_what_a_killed_writer_left_is_no_other_content(tmp_path, checkpoint, reader):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / ".prediction.json.x1y2.part").write_text("{")
+    claim_folder(out, checkpoint, reader, "val", "trained")
+    assert "prediction.json" in files(out)
 
 
 def test_a_file_in_the_folders_place_is_refused(checkpoint, reader):
     with pytest.raises(DataError, match=r"last\.ckpt: expected a new or empty folder, found a file; choose another"):
-        claim_folder(checkpoint, checkpoint, reader, "val")
+        claim_folder(checkpoint, checkpoint, reader, "val", "trained")
 
 
 @pytest.mark.parametrize("content", [b"", b"[]", b"{", b"\xff"])
@@ -166,4 +176,4 @@ def test_a_record_of_another_program_is_refused(tmp_path, checkpoint, reader, co
     out.mkdir()
     (out / "prediction.json").write_bytes(content)
     with pytest.raises(DataError, match="choose another out"):
-        claim_folder(out, checkpoint, reader, "val")
+        claim_folder(out, checkpoint, reader, "val", "trained")

@@ -1,6 +1,6 @@
 """Putting the components together, and the checkpoint that takes them apart again."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,8 @@ from most.network import Network
 from most.panoptic import Membership
 from most.voxels import Grid
 
-FORMAT = 1
+FORMAT = 2
+KEYS = ("most_run", "state_dict")  # beside "most", which describes the model: what it was trained with, its weights
 GROUPS = ("grid", "encoder", "backbone", "centre_head", "semantic_head", "membership", "inference")
 
 
@@ -71,6 +72,20 @@ def describe(parts: dict[str, Any], taxonomy: Taxonomy, sweeps: int) -> dict[str
         "taxonomy": describe_taxonomy(taxonomy),
         "sweeps": sweeps,
         "parts": {group: to_plain(group, part) for group, part in parts.items()},
+    }
+
+
+def describe_run(config: Config, stage: str, scans: int) -> dict[str, Any]:
+    """Return what a stage's weights depend on besides its model, in plain types: a run goes on only with the same."""
+    return {
+        "stage": stage,
+        "training": asdict(getattr(config.stage, stage)),
+        "augment": asdict(config.augment),
+        "extent": to_plain("extent", config.extent),
+        "scans": scans,
+        "seed": config.seed,
+        "batch_size": config.dataset.batch_size,
+        "processes": config.trainer.processes(),
     }
 
 
@@ -131,4 +146,6 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
             f"{path}: expected checkpoint format {FORMAT}, found {found}; load it with the version of most that "
             "wrote it, or train it again"
         )
+    if missing := [key for key in KEYS if not isinstance(checkpoint.get(key), dict)]:
+        raise DataError(f"{path}: expected a whole checkpoint, found none of {', '.join(missing)}; copy it again")
     return checkpoint

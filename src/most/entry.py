@@ -10,14 +10,15 @@ from omegaconf.errors import OmegaConfBaseException
 
 from most.errors import MostError
 
-NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM)
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+NO_RIGHT = (errno.EROFS, errno.EACCES, errno.EPERM)
 
 
 def start(main: Callable[[], None]) -> None:
     """Run a command's main function: a configuration that does not compose is a mistake as well."""
     os.environ.setdefault("HYDRA_FULL_ERROR", "1")  # else Hydra shortens every error, those of the program too
     try:
-        main()
+        run(main)
     except (HydraException, OmegaConfBaseException) as error:
         _end(str(error), 2)
 
@@ -29,10 +30,11 @@ def run(task: Callable[[], None]) -> None:
     except MostError as error:
         _end(_message(error), error.exit_code)
     except OSError as error:
-        if error.errno not in NO_ROOM:
+        advice = {**dict.fromkeys(NO_ROOM, "make room"), **dict.fromkeys(NO_RIGHT, "choose another place")}
+        if error.errno not in advice:
             raise
-        place = error.filename or "the output folder"
-        _end(f"{place}: expected to be able to write, found {error.strerror}; make room or choose another folder", 2)
+        place = error.filename or "an output file"
+        _end(f"{place}: expected to read or write it, found {error.strerror}; {advice[error.errno]}", 2)
 
 
 def _message(error: MostError) -> str:

@@ -18,4 +18,7 @@ class DataError(MostError):
 class StoppedError(MostError):
     """The user stopped the work; the message says how to go on."""
 
-    exit_code = 130  # as shells report SIGINT
+    def __init__(self, message: str, exit_code: int) -> None:
+        """``exit_code`` is 128 and the number of the signal, as shells report it."""
+        super().__init__(message)
+        self.exit_code = exit_code

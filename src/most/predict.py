@@ -33,6 +33,14 @@ class PredictConfig:
     def __post_init__(self) -> None:
         if self.membership not in ("trained", "nearest"):
             raise ConfigError(f"membership: expected trained or nearest, found {self.membership}")
+        self.chosen_device()
+
+    def chosen_device(self) -> torch.device:
+        """Return where to predict; one that is not there is a ConfigError."""
+        there = torch.cuda.is_available()
+        if self.device not in ("auto", "cpu", *(["cuda"] if there else [])):
+            raise ConfigError(f"device: expected auto, cpu, or cuda where there is a GPU, found {self.device}")
+        return torch.device("cuda" if there and self.device != "cpu" else "cpu")
 
 
 register()
@@ -52,8 +60,7 @@ def predict(config: PredictConfig) -> None:
     frames = unfinished(reader, frames, out)
     windows = WindowDataset(reader, frames, trained.sweeps)
     loader = DataLoader(windows, dataset.batch_size, num_workers=dataset.workers, collate_fn=list)
-    device = config.device if config.device != "auto" else "cuda" if torch.cuda.is_available() else "cpu"
-    write_predictions(predictor, loader, reader, out, len(frames), torch.device(device))
+    write_predictions(predictor, loader, reader, out, len(frames), config.chosen_device())
 
 
 @hydra.main(version_base=None, config_path=str(conf_dir()), config_name="predict")

@@ -19,9 +19,9 @@ def total(values: Tensor) -> Tensor:
     """Sum over all processes, without a gradient."""
     if processes() == 1:
         return values.detach()
-    summed = values.detach().clone()
-    distributed.all_reduce(summed)
-    return summed
+    everyones = values.detach().clone()
+    distributed.all_reduce(everyones)
+    return everyones
 
 
 def count(items: int, device: torch.device) -> int:
@@ -37,12 +37,12 @@ def summed(values: Tensor) -> Tensor:
     return out
 
 
-def mean_over_all(part: Tensor, count: Tensor, smallest: float = 1.0) -> Tensor:
-    """A loss summed over this process' items, divided by the mean ``count`` of items a process has.
+def mean_over_all(part: Tensor, items: Tensor, smallest: float = 1.0) -> Tensor:
+    """A loss summed over this process' items, divided by the mean number of ``items`` a process has.
 
     Averaged over processes, as DDP averages gradients, it is the sum over all items divided by their number.
     """
-    return part * processes() / total(count.to(part.dtype)).clamp(min=smallest)
+    return part * processes() / total(items.to(part.dtype)).clamp(min=smallest)
 
 
 class _Sum(torch.autograd.Function):

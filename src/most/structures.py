@@ -60,10 +60,11 @@ class Instances(OnDevice):
         """Keep the instances a boolean mask or an index names."""
         return Instances(**{field.name: getattr(self, field.name)[keep] for field in fields(self)})
 
-    def cat(self, other: "Instances") -> "Instances":
-        """These instances, then the other ones."""
-        names = [field.name for field in fields(self)]
-        return Instances(**{name: torch.cat([getattr(self, name), getattr(other, name)]) for name in names})
+    @staticmethod
+    def cat(parts: "list[Instances]") -> "Instances":
+        """The instances of several sweeps, one after the other."""
+        names = [field.name for field in fields(Instances)]
+        return Instances(**{name: torch.cat([getattr(part, name) for part in parts]) for name in names})
 
 
 @dataclass

@@ -12,12 +12,11 @@ from hydra.types import RunMode
 from lightning.pytorch.loggers import Logger
 from omegaconf import DictConfig, OmegaConf
 
-from most.assembly import read_checkpoint
+from most.checks import stages_to_run
 from most.config import Config, conf_dir, register, typed
 from most.datasets.datamodule import SemanticKITTIDataModule
 from most.entry import run, start
 from most.metrics.report import write_report
-from most.resuming import stages_to_run
 from most.training import Stage, build_detection, build_membership_stage, build_trainer, handed_over
 
 register()
@@ -31,28 +30,27 @@ def train(config: Config, folder: Path) -> None:
     if config.trainer.threads:
         torch.set_num_threads(config.trainer.threads)
     data = SemanticKITTIDataModule(config.dataset, config.augment, config.extent, config.seed)
-    for split in ("train", "val"):
-        data.reader.sequences(split)  # raises where the dataset is not there, before any work
-    names = stages_to_run(config, data.reader.taxonomy, folder)
+    names = stages_to_run(config, data.reader, folder)
     settings: Any = OmegaConf.to_container(OmegaConf.structured(config))
     try:
         logger = config.logger.build(folder, config.name, settings)
         for name in names:
-            run_stage(name, config, data, folder, logger)
+            run_stage(name, config, data, folder, logger, config.resume if name == names[0] else None)
     finally:
         wandb.finish()  # the next job of a sweep runs in this process, and is another run
 
 
-def run_stage(name: str, config: Config, data: SemanticKITTIDataModule, folder: Path, logger: Logger | bool) -> None:
-    """Train one stage to its end, and write what it reached."""
+def run_stage(
+    name: str, config: Config, data: SemanticKITTIDataModule, folder: Path, logger: Logger | bool, resume: str | None
+) -> None:
+    """Train one stage from its beginning, or from a checkpoint, to its end, and write what it reached."""
     L.seed_everything(config.seed, workers=True)
-    resume = config.resume if config.resume and read_checkpoint(Path(config.resume))["most_stage"] == name else None
     stage: Stage
     if name == "detection":
         stage = build_detection(config, data)
     else:
         stage1 = resume or config.stage1 or handed_over(config, folder)
-        stage = build_membership_stage(config, Path(stage1), data.reader.taxonomy)
+        stage = build_membership_stage(config, Path(stage1), data.reader)
     trainer = build_trainer(config, stage, folder, logger)
     trainer.fit(stage, datamodule=data, ckpt_path=resume, weights_only=True)
     if stage.report.get("epochs") != stage.training_settings.epochs:

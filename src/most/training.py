@@ -1,19 +1,28 @@
 """A training run put together: stages, trainer, callbacks, logger."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import lightning as L
 import torch
 from lightning.pytorch.callbacks import Callback, LearningRateMonitor, ModelCheckpoint, TQDMProgressBar
 from lightning.pytorch.loggers import Logger
 
-from most.assembly import build_membership, build_network, build_predictor, describe, load_trained, model_parts
+from most.assembly import (
+    build_membership,
+    build_network,
+    build_predictor,
+    describe,
+    describe_run,
+    load_trained,
+    model_parts,
+)
 from most.config import Config
 from most.datasets.class_counts import class_counts
 from most.datasets.datamodule import SemanticKITTIDataModule
-from most.datasets.taxonomy import Taxonomy
-from most.errors import ConfigError
+from most.datasets.reader import Reader
 from most.membership import Nearest, PointSegMLP
 from most.stages.callbacks import Throughput
 from most.stages.checkpoints import AtomicCheckpointIO, LastCheckpoint
@@ -31,29 +40,35 @@ def build_detection(config: Config, data: SemanticKITTIDataModule) -> DetectionS
     training = config.stage.detection
     balanced = training.losses.class_balance > 0
     counts = class_counts(data.reader, "train") if balanced else torch.ones(taxonomy.num_classes, dtype=torch.long)
-    description = describe(parts, taxonomy, config.dataset.sweeps)
-    steps = training.epochs * steps_per_epoch(config, len(data.reader.frames("train")))
-    return DetectionStage(predictor, taxonomy, counts, training, description, steps)
+    scans = len(data.reader.frames("train"))
+    steps = training.epochs * steps_per_epoch(config, scans)
+    return DetectionStage(predictor, taxonomy, counts, training, _notes(config, "detection", parts, data.reader), steps)
 
 
 def steps_per_epoch(config: Config, scans: int) -> int:
     """Return the optimiser's steps in an epoch of stage 1; Lightning's own count would make the loaders too early."""
     batches = math.ceil(math.ceil(scans / config.trainer.processes()) / config.dataset.batch_size)
-    return math.ceil(
-        batches / config.trainer.accumulated(config.stage.detection.batch_size, config.dataset.batch_size, "detection")
+    together = config.trainer.accumulated(config.stage.detection.batch_size, config.dataset.batch_size, "detection")
+    return math.ceil(batches / together)
+
+
+def build_membership_stage(config: Config, stage1: Path, reader: Reader) -> MembershipStage:
+    """Read stage 1 from a checkpoint and put a new membership after it."""
+    parts, taxonomy = model_parts(config), reader.taxonomy
+    predictor = replace(load_trained(stage1).predictor, settings=config.inference)
+    membership = build_membership(parts, predictor.network, taxonomy)
+    assert isinstance(membership, PointSegMLP)  # most.checks
+    return MembershipStage(
+        predictor, membership, taxonomy, config.stage.membership, _notes(config, "membership", parts, reader)
     )
 
 
-def build_membership_stage(config: Config, stage1: Path, taxonomy: Taxonomy) -> MembershipStage:
-    """Read stage 1 from a checkpoint and put a new membership after it."""
-    predictor, parts = load_trained(stage1).predictor, model_parts(config)
-    membership = build_membership(parts, predictor.network, taxonomy)
-    if not isinstance(membership, PointSegMLP):
-        raise ConfigError(
-            "membership: expected one that stage 2 can train, such as full, found nearest; or stage=detection"
-        )
-    description = describe(parts, taxonomy, config.dataset.sweeps)
-    return MembershipStage(predictor, membership, taxonomy, config.stage.membership, description)
+def _notes(config: Config, stage: str, parts: dict[str, Any], reader: Reader) -> dict[str, Any]:
+    """Return what a stage's checkpoints say of themselves."""
+    return {
+        "most": describe(parts, reader.taxonomy, config.dataset.sweeps),
+        "most_run": describe_run(config, stage, len(reader.frames("train"))),
+    }
 
 
 def checkpoint_path(folder: Path, stage: str, which: str) -> Path:
@@ -95,7 +110,12 @@ def _callbacks(config: Config, stage: Stage, folder: Path) -> list[Callback]:
     best, last = (checkpoint_path(folder, stage.name, which) for which in ("best", "last"))
     callbacks: list[Callback] = [
         ModelCheckpoint(
-            best.parent, best.stem, monitor=f"{stage.prefix}val/pq", mode="max", enable_version_counter=False
+            best.parent,
+            best.stem,
+            monitor=f"{stage.prefix}val/pq",
+            mode="max",
+            save_on_train_epoch_end=False,
+            enable_version_counter=False,
         ),
         LastCheckpoint(last, config.trainer.save_every),
         Throughput(stage.prefix),

@@ -100,14 +100,17 @@ def test_prediction_goes_on_where_it_stopped_and_refuses_another_models_folder(r
     assert "choose another out" in other.stderr
 
 
-def test_a_run_does_not_go_on_with_another_length_or_from_another_model(run):
-    arguments = [*TRAIN, f"resume={MODEL}", "hydra.run.dir=other"]
-    longer = most(run, "train", *arguments, "stage.membership.epochs=3")
-    assert longer.returncode == 2
-    assert "stage.membership.epochs: expected 2" in longer.stderr
-    wider = most(run, "train", *arguments, "encoder.widths=[8,8]")
-    assert wider.returncode == 2
-    assert "was trained with another model" in wider.stderr
+def test_a_run_goes_on_with_its_own_settings_in_its_own_folder_alone(run):
+    arguments = [*TRAIN, f"resume={MODEL}"]
+    for change, message in {
+        "stage.membership.epochs=3": "began with training.epochs = 2, found 3",
+        "encoder.widths=[8,8]": "began with parts.encoder.settings.widths = [8, 4], found [8, 8]",
+        "seed=2": "began with seed = 1, found 2",
+        "hydra.run.dir=other": "expected the run's own folder, found",
+    }.items():
+        refused = most(run, "train", *arguments, "hydra.run.dir=run", change)
+        assert refused.returncode == 2
+        assert message in refused.stderr
     assert not (run / "other" / "metrics.json").exists()
 
 

@@ -8,8 +8,7 @@ import torch
 
 from commands import SIMULATE, TRAIN, most, signalled
 
-QUIET = ["logger=none", "logger.pictures=0", "trainer.progress_bar=false"]
-OFTEN = "trainer.save_every=0.00001"
+ARGUMENTS = [*TRAIN, "logger=none", "logger.pictures=0", "trainer.progress_bar=false", "trainer.validate_every=1"]
 
 
 @pytest.fixture(scope="module")
@@ -17,40 +16,42 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Simulated streets, and a training of both stages from beginning to end: 3 batches an epoch, 2 epochs a stage."""
     made = tmp_path_factory.mktemp("interruptions")
     assert most(made, "simulate", *SIMULATE).returncode == 0
-    done = most(made, "train", *TRAIN, *QUIET, "hydra.run.dir=whole")
+    done = most(made, "train", *ARGUMENTS, "hydra.run.dir=whole")
     assert done.returncode == 0, done.stderr
     return made
 
 
-def weights(folder: Path, stage: str) -> dict[str, torch.Tensor]:
-    return torch.load(folder / "checkpoints" / f"{stage}-last.ckpt", weights_only=True)["state_dict"]
-
-
 def assert_same_as_uninterrupted(folder: Path, run: str) -> None:
-    for stage in ("detection", "membership"):
-        whole, found = weights(folder / "whole", stage), weights(folder / run, stage)
+    names = [path.name for path in (folder / "whole/checkpoints").iterdir()]
+    assert sorted(path.name for path in (folder / run / "checkpoints").iterdir()) == sorted(names)
+    for name in names:
+        whole, found = (
+            torch.load(folder / each / "checkpoints" / name, weights_only=True)["state_dict"] for each in ("whole", run)
+        )
         assert whole.keys() == found.keys()
-        assert all(torch.equal(value, found[name]) for name, value in whole.items()), stage
+        assert all(torch.equal(value, found[key]) for key, value in whole.items()), name
     assert (folder / run / "metrics.json").read_bytes() == (folder / "whole" / "metrics.json").read_bytes()
 
 
-@pytest.mark.parametrize(("stage", "batch"), [("detection", 5), ("detection", 3), ("membership", 10)])
+@pytest.mark.parametrize(("stage", "batch"), [("detection", 6), ("detection", 4), ("membership", 12)])
 def test_after_sigkill_a_resumed_run_ends_with_the_same_weights(folder: Path, stage: str, batch: int) -> None:
+    """Killed after the checkpoint within the second epoch, and after the one that the first epoch left."""
     run = f"killed_{batch}"
-    arguments = [*TRAIN, *QUIET, OFTEN, f"hydra.run.dir={run}"]
+    arguments = [*ARGUMENTS, f"hydra.run.dir={run}"]
     assert signalled(folder, signal.SIGKILL, batch, *arguments).returncode == -signal.SIGKILL
     done = most(folder, "train", *arguments, f"resume={run}/checkpoints/{stage}-last.ckpt")
     assert done.returncode == 0, done.stderr
     assert_same_as_uninterrupted(folder, run)
 
 
-def test_sigint_lets_the_step_end_saves_and_says_how_to_go_on(folder: Path) -> None:
-    arguments = [*TRAIN, *QUIET, "hydra.run.dir=stopped"]
-    stopped = signalled(folder, signal.SIGINT, 4, *arguments)
-    assert stopped.returncode == 130
-    assert "Traceback" not in stopped.stderr
-    assert "repeat the command with resume=" in stopped.stderr
-    told = stopped.stderr.split("repeat the command with ")[1].split()
-    done = most(folder, "train", *arguments[:-1], *told)
+def test_sigint_ends_with_a_checkpoint_and_says_how_to_go_on_as_often_as_it_comes(folder: Path) -> None:
+    """In a step, in a validation, and in the last step of an epoch."""
+    arguments, told = [*ARGUMENTS, "dataset.workers=1"], ["hydra.run.dir=stopped"]
+    for hook, call in (("on_train_batch_end", 2), ("on_validation_batch_end", 1), ("on_train_batch_end", 1)):
+        stopped = signalled(folder, signal.SIGINT, call, *arguments, *told, hook=hook)
+        assert stopped.returncode == 130, stopped.stderr
+        assert "Traceback" not in stopped.stderr
+        told = stopped.stderr.split("repeat the command with ")[1].split()
+    done = most(folder, "train", *arguments, *told)
     assert done.returncode == 0, done.stderr
     assert_same_as_uninterrupted(folder, "stopped")

@@ -58,7 +58,7 @@ def stage(settings: PointSegMLPSettings | None = None) -> MembershipStage:
     channels = Channels(TAXONOMY.num_classes - 1, list(TAXONOMY.things), 4, 8)
     torch.manual_seed(0)
     mlp = (settings or PointSegMLPSettings([16, 16])).build(channels)
-    return MembershipStage(predictor, mlp, TAXONOMY, MembershipTraining(), {"format": 1})
+    return MembershipStage(predictor, mlp, TAXONOMY, MembershipTraining(), {})
 
 
 @pytest.mark.parametrize(("bev", "point"), [(True, True), (True, False), (False, False)])

@@ -1,5 +1,6 @@
 """Lightning's view of SemanticKITTI trees, real or simulated: a loader a split, batches of ``list[Sample]``."""
 
+import signal
 from dataclasses import dataclass, field
 
 import lightning as L
@@ -104,4 +105,10 @@ class SemanticKITTIDataModule(L.LightningDataModule):
             num_workers=self.settings.workers,
             persistent_workers=self.settings.workers > 0,
             collate_fn=list,
+            worker_init_fn=_leave_interrupts_to_the_main_process,
         )
+
+
+def _leave_interrupts_to_the_main_process(_: int) -> None:
+    """A terminal sends Ctrl-C to all processes; the step that the main one still ends needs its loaders."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -59,6 +59,6 @@ def _join(mine: Instances | None, theirs: Instances | None, labels: Tensor) -> I
     """Both windows' instances, counted anew in the joined labels; those without a point left go."""
     if mine is None or theirs is None:
         return None
-    joined = mine.cat(replace(theirs, keys=theirs.keys + OTHER))
+    joined = Instances.cat([mine, replace(theirs, keys=theirs.keys + OTHER)])
     counts = (labels[:, None] == joined.keys).sum(0)
     return replace(joined, counts=counts).select(counts > 0)

@@ -34,7 +34,9 @@ class Evidence(OnDevice):
 
     def bev_at(self, places: Float[Tensor, "places 3"]) -> Float[Tensor, "places bev_channels"]:
         """F_bev interpolated between the middles of the four cells about each place; beyond the map its border's."""
-        lower, cell, shape = (places.new_tensor(values) for values in vars(self.bev_grid).values())
-        middle = (places[:, :2] - lower) / (cell * shape) * 2 - 1  # in [-1, 1] over the map, as grid_sample counts
-        steps = middle.nan_to_num(0.0)[None, :, None, [1, 0]].to(self.bev.dtype)
-        return F.grid_sample(self.bev[None], steps, padding_mode="border", align_corners=False)[0, :, :, 0].T
+        grid = self.bev_grid
+        lower, cell, cells = (places.new_tensor(value) for value in (grid.lower, grid.cell, grid.shape))
+        middle = (places[:, :2] - lower) / (cell * cells) * 2 - 1  # in [-1, 1] over the map, as grid_sample counts
+        steps = middle.nan_to_num(0.0).float()[None, :, None, [1, 0]]  # half a precision would be half a cell
+        bev = self.bev[None].float()
+        return F.grid_sample(bev, steps, padding_mode="border", align_corners=False)[0, :, :, 0].T

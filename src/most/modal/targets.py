@@ -1,6 +1,6 @@
 """What the detection heads shall say: class-wise heat maps of modal centres, and regressions at the centres' cells."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import torch
 from jaxtyping import Bool, Float, Int64
@@ -39,7 +39,7 @@ def bev_targets(
     Channel k of the heat map is the class ``thing_ids[k]``. Instances whose centre lies outside the grid are left out.
     """
     batch = torch.cat([torch.full_like(each.keys, i) for i, each in enumerate(instances)])
-    merged = _concatenate(instances)
+    merged = Instances.cat(instances)
     device = merged.centres.device
     size, sides = torch.tensor(cell, device=device), torch.tensor(shape, device=device)
     position = (merged.centres[:, :2] - torch.tensor(lower, device=device)) / size
@@ -72,7 +72,3 @@ def _largest_per_cell(cells: Int64[Tensor, "centres"], counts: Int64[Tensor, "ce
     first = torch.ones_like(order, dtype=torch.bool)
     first[1:] = cells[order][1:] != cells[order][:-1]
     return order[first]
-
-
-def _concatenate(instances: list[Instances]) -> Instances:
-    return Instances(**{f.name: torch.cat([getattr(each, f.name) for each in instances]) for f in fields(Instances)})

@@ -14,11 +14,13 @@ import lightning as L
 import torch
 from lightning.fabric.plugins.io.torch_io import TorchCheckpointIO
 from lightning.pytorch.callbacks import Callback
+from torch import distributed
 
 from most.errors import DataError, StoppedError
 from most.files import atomic_write
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+GO_ON, SAVE, STOP = range(3)
 
 
 class AtomicCheckpointIO(TorchCheckpointIO):
@@ -36,7 +38,7 @@ class AtomicCheckpointIO(TorchCheckpointIO):
 class LastCheckpoint(Callback):
     """Keeps the newest state of a stage at ``path``.
 
-    The first SIGINT or SIGTERM lets the step end, saves, and raises ``StoppedError``; another one is as abrupt as ever.
+    The first SIGINT or SIGTERM lets the step end, saves, and raises ``StoppedError``; the second is as abrupt as ever.
     """
 
     def __init__(self, path: Path, minutes: float) -> None:
@@ -44,7 +46,7 @@ class LastCheckpoint(Callback):
         self.path = path
         self.seconds = 60 * minutes
         self.saved = 0.0
-        self.asked = False
+        self.asked = 0  # the signal that came, if one did
         self.former: dict[int, Any] = {}
 
     def on_train_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
@@ -56,31 +58,30 @@ class LastCheckpoint(Callback):
     def on_train_batch_end(
         self, trainer: L.Trainer, pl_module: L.LightningModule, outputs: Any, batch: Any, batch_idx: int
     ) -> None:
-        """Save when it is time to."""
-        if (batch_idx + 1) % trainer.accumulate_grad_batches and not trainer.is_last_batch:
+        """Save when it is time to, and before an epoch's last step: going on repeats that and the validation."""
+        if (batch_idx + 1) % trainer.accumulate_grad_batches or trainer.is_last_batch:
             return
-        asked, due = self._agreed(trainer, self.asked), time.monotonic() - self.saved > self.seconds
-        if asked or self._agreed(trainer, due):
+        last_step_next = trainer.num_training_batches - (batch_idx + 1) <= trainer.accumulate_grad_batches
+        due = last_step_next or time.monotonic() - self.saved > self.seconds
+        wish = _highest(trainer, STOP if self.asked else SAVE if due else GO_ON)
+        if wish != GO_ON:
             self._save(trainer)
-        if asked:
-            raise self._stopped()
+        if wish == STOP:
+            self._stop(trainer)
 
     def on_validation_batch_end(self, trainer: L.Trainer, *_: Any) -> None:
-        """Stop between two sweeps; what the epoch reached was saved when validation began.
+        """Stop between two sweeps.
 
-        Several processes stop after their next training step instead: their shares of the sweeps may be uneven.
+        Several processes stop at the epoch's end instead: their shares of the sweeps may be uneven.
         """
         if trainer.state.fn == "fit" and self.asked and trainer.world_size == 1:
-            raise self._stopped()
-
-    def on_validation_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
-        """Keep what the epoch reached."""
-        if trainer.state.fn == "fit" and not trainer.sanity_checking:
-            self._save(trainer)
+            self._stop(trainer)
 
     def on_train_epoch_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
         """Keep what the epoch reached."""
         self._save(trainer)
+        if _highest(trainer, STOP if self.asked else GO_ON) == STOP:
+            self._stop(trainer)
 
     def teardown(self, trainer: L.Trainer, pl_module: L.LightningModule, stage: str) -> None:
         """Leave signals as they were."""
@@ -91,18 +92,26 @@ class LastCheckpoint(Callback):
     def _ask(self, number: int, frame: FrameType | None) -> None:
         if self.asked:
             raise KeyboardInterrupt
-        self.asked = True
+        self.asked = number
         print("\nmost: stopping after this step; once more to stop at once", flush=True)
-
-    def _stopped(self) -> StoppedError:
-        return StoppedError(
-            f"interrupted; to go on, repeat the command with resume={self.path} hydra.run.dir={self.path.parents[1]}"
-        )
-
-    def _agreed(self, trainer: L.Trainer, wish: bool) -> bool:
-        """Whether any process wishes it; all of them must save together."""
-        return trainer.strategy.reduce_boolean_decision(wish, all=False)
 
     def _save(self, trainer: L.Trainer) -> None:
         trainer.save_checkpoint(self.path)
         self.saved = time.monotonic()
+
+    def _stop(self, trainer: L.Trainer) -> None:
+        if not trainer.is_global_zero:
+            raise SystemExit(0)  # one message is enough, and a failing child would be the end of the first process
+        goes_on = f"resume={self.path} hydra.run.dir={self.path.parents[1]}" if self.path.is_file() else "nothing added"
+        raise StoppedError(
+            f"interrupted; to go on, repeat the command with {goes_on}", 128 + (self.asked or signal.SIGTERM)
+        )
+
+
+def _highest(trainer: L.Trainer, wish: int) -> int:
+    """The most urgent wish of any process: all of them save together."""
+    if trainer.world_size == 1:
+        return wish
+    wishes = torch.tensor(wish, device=trainer.strategy.root_device)
+    distributed.all_reduce(wishes, distributed.ReduceOp.MAX)
+    return int(wishes)

@@ -133,9 +133,7 @@ class DetectionStage(L.LightningModule):
 
     def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
         """Add what it takes to make the network again."""
-        checkpoint["most"] = self.description
-        checkpoint["most_stage"] = self.name
-        checkpoint["most_epochs"] = self.training_settings.epochs
+        checkpoint.update(self.description)
 
     def configure_optimizers(self) -> OptimizerLRSchedulerConfig:
         """See :func:`one_cycle`."""

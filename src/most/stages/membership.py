@@ -29,9 +29,10 @@ class MembershipTraining:
     epochs: int = 20
 
     def __post_init__(self) -> None:
-        for name in ("lr", "batch_size", "epochs"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"stage.membership.{name}: expected a positive number, found {getattr(self, name)}")
+        numbers = {"lr": self.lr, "batch_size": self.batch_size, "epochs": self.epochs}
+        for name, value in (numbers if self.clip is None else numbers | {"clip": self.clip}).items():
+            if not value > 0:
+                raise ConfigError(f"stage.membership.{name}: expected a positive number, found {value}")
         if not 0 <= self.momentum < 1:
             raise ConfigError(f"stage.membership.momentum: expected a number in [0, 1), found {self.momentum}")
 
@@ -119,9 +120,7 @@ class MembershipStage(L.LightningModule):
 
     def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
         """Add what it takes to make both networks again."""
-        checkpoint["most"] = self.description
-        checkpoint["most_stage"] = self.name
-        checkpoint["most_epochs"] = self.training_settings.epochs
+        checkpoint.update(self.description)
 
     def configure_optimizers(self) -> torch.optim.Optimizer:
         """Plain SGD (implementation details)."""

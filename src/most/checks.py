@@ -1,0 +1,115 @@
+"""What a training is asked to do, held against what there is, before any work."""
+
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from most.assembly import describe, describe_run, model_parts, read_checkpoint
+from most.config import Config
+from most.datasets.reader import Reader
+from most.datasets.taxonomy import Taxonomy
+from most.errors import ConfigError
+from most.membership import Nearest, PointSegMLPSettings
+from most.stages.trainer import TrainerSettings
+
+STAGE1 = ("grid", "encoder", "backbone", "centre_head", "semantic_head")
+
+
+def stages_to_run(config: Config, reader: Reader, folder: Path) -> list[str]:
+    """Return the stages still to be trained in the run's ``folder``; what does not fit is a ConfigError."""
+    names: list[str] = config.stage.run
+    check_devices(config.trainer)
+    for split in ("train", "val"):
+        scans = len(reader.frames(split))  # raises where the dataset is not there
+        if scans < config.trainer.processes():
+            raise ConfigError(
+                f"trainer.devices: expected at most as many processes as split {split} has scans, {scans}, "
+                f"found {config.trainer.processes()}"
+            )
+    for name in names:
+        config.trainer.accumulated(getattr(config.stage, name).batch_size, config.dataset.batch_size, name)
+    if "membership" in names and not isinstance(config.membership, PointSegMLPSettings):
+        raise ConfigError(
+            "membership: expected one that stage 2 can train, such as full, found nearest; with it say stage=detection"
+        )
+    if config.resume:
+        return names[names.index(check_resume(config, reader, folder)) :]
+    check_folder(folder)
+    check_stage1(config, reader.taxonomy)
+    return names
+
+
+def check_devices(trainer: TrainerSettings) -> None:
+    """Refuse a GPU where there is none, or more of them than there are."""
+    there = torch.cuda.device_count()
+    if trainer.accelerator == "gpu" and there < max(trainer.devices, 1):
+        raise ConfigError(
+            f"trainer.devices: expected no more GPUs than the {there} there are, found {trainer.devices}; "
+            "trainer=cpu runs without one"
+        )
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse a folder with another run's checkpoints, which would be overwritten."""
+    if kept := sorted((folder / "checkpoints").glob("*.ckpt")):
+        raise ConfigError(
+            f"hydra.run.dir: expected a folder without checkpoints, found {kept[0]}; "
+            f"choose another one, or go on with resume={kept[0]}"
+        )
+
+
+def check_resume(config: Config, reader: Reader, folder: Path) -> str:
+    """Return the stage that a run goes on with; refuse another model, other settings, or another folder."""
+    path = Path(str(config.resume))
+    saved = read_checkpoint(path)
+    stage: str = saved["most_run"]["stage"]
+    if stage not in config.stage.run:
+        raise ConfigError(f"resume: {path} is of stage {stage}; expected one of {', '.join(config.stage.run)}")
+    parts = model_parts(config) | ({"membership": Nearest()} if stage == "detection" else {})
+    expected = {
+        "most": describe(parts, reader.taxonomy, config.dataset.sweeps),
+        "most_run": describe_run(config, stage, len(reader.frames("train"))),
+    }
+    for part, now in expected.items():
+        began = _flat(saved[part])
+        for key, value in _flat(now).items():
+            if began.get(key) != value:
+                raise ConfigError(
+                    f"resume: {path} began with {key} = {began.get(key)}, found {value}; "
+                    "repeat the settings it began with"
+                )
+    home = path.resolve().parents[1]
+    if home != folder.resolve():
+        raise ConfigError(f"resume: expected the run's own folder, found {folder}; add hydra.run.dir={home}")
+    return stage
+
+
+def check_stage1(config: Config, taxonomy: Taxonomy) -> None:
+    """Refuse a stage 1 of another taxonomy, window, grid or network than the configuration's, or a needless one."""
+    if "detection" in config.stage.run:
+        if config.stage1 is not None:
+            raise ConfigError("stage1: expected none where stage 1 is trained anew; say stage=membership to use it")
+        return
+    if config.stage1 is None:
+        raise ConfigError(
+            "stage1: expected a checkpoint of stage 1, found none; say stage1=FILE, or train it: stage=both"
+        )
+    path = Path(config.stage1)
+    saved, expected = read_checkpoint(path)["most"], describe(model_parts(config), taxonomy, config.dataset.sweeps)
+    pairs = {name: (expected[name], saved[name]) for name in ("taxonomy", "sweeps")}
+    pairs |= {name: (expected["parts"][name], saved["parts"][name]) for name in STAGE1}
+    for name, (wanted, found) in pairs.items():
+        if wanted != found:
+            raise ConfigError(
+                f"stage1: {path} was trained with another {name}: expected {wanted}, found {found}; "
+                "repeat the settings that stage 1 was trained with"
+            )
+
+
+def _flat(settings: dict[str, Any], before: str = "") -> dict[str, Any]:
+    """Nested settings by dotted names."""
+    flat = {}
+    for key, value in settings.items():
+        flat |= _flat(value, f"{before}{key}.") if isinstance(value, dict) else {f"{before}{key}": value}
+    return flat

@@ -1,0 +1,139 @@
+"""What a training is asked to do is held against what there is, before any work."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+import torch
+
+from most.assembly import FORMAT, describe, describe_run, model_parts
+from most.backbones import AsymmetricUNetSmallSettings
+from most.checks import check_resume, stages_to_run
+from most.config import Config, Heads
+from most.datasets.augment import Augment
+from most.datasets.datamodule import SemanticKITTISettings
+from most.datasets.semantickitti import SemanticKITTI, Splits
+from most.errors import ConfigError, DataError
+from most.membership import Nearest, PointSegMLPSettings
+from most.modal.extent import TrackMax
+from most.stages.detection import DetectionTraining
+from most.stages.membership import MembershipTraining
+from most.stages.settings import StageSettings
+from most.stages.trainer import TrainerSettings
+from semantickitti_tree import write_sequence
+from tiny import TAXONOMY, tiny_parts
+
+
+@pytest.fixture
+def reader(tmp_path: Path) -> SemanticKITTI:
+    write_sequence(tmp_path / "tree", "00", range(4))
+    return SemanticKITTI(tmp_path / "tree", Splits(train=["00"], val=["00"]))
+
+
+@pytest.fixture
+def config() -> Config:
+    parts = tiny_parts()
+    return Config(
+        dataset=SemanticKITTISettings(sweeps=2), augment=Augment(), extent=TrackMax(), trainer=TrainerSettings(),
+        stage=StageSettings(detection=DetectionTraining(epochs=4), membership=MembershipTraining(epochs=2)),
+        heads=Heads(parts["centre_head"], parts["semantic_head"]), membership=PointSegMLPSettings([4]),
+        **{name: parts[name] for name in ("grid", "encoder", "backbone", "inference")},
+    )  # fmt: skip
+
+
+def save(config: Config, folder: Path, stage: str) -> Path:
+    """A checkpoint of a run of this configuration, without weights."""
+    parts = model_parts(config) | ({"membership": Nearest()} if stage == "detection" else {})
+    path = folder / "checkpoints" / f"{stage}-last.ckpt"
+    path.parent.mkdir(exist_ok=True)
+    content = {"most": describe(parts, TAXONOMY, 2), "most_run": describe_run(config, stage, 4), "state_dict": {}}
+    torch.save(content, path)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("stage", "left"), [("detection", ["detection", "membership"]), ("membership", ["membership"])]
+)
+def test_a_run_goes_on_with_the_stage_of_its_checkpoint(config, reader, tmp_path, stage, left):
+    config.resume = str(save(config, tmp_path, stage))
+    assert stages_to_run(config, reader, tmp_path) == left
+
+
+def test_a_run_begins_with_its_first_stage(config, reader, tmp_path):
+    assert stages_to_run(config, reader, tmp_path) == ["detection", "membership"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"backbone": AsymmetricUNetSmallSettings(widths=[4, 4, 8, 16], bev_channels=8)}, r"found \[4, 4, 8, 16\]"),
+        ({"dataset": SemanticKITTISettings(sweeps=3)}, "sweeps = 2, found 3"),
+        ({"dataset": SemanticKITTISettings(sweeps=2, batch_size=2)}, "batch_size = 1, found 2"),
+        ({"stage": StageSettings(detection=DetectionTraining(epochs=8))}, r"training\.epochs = 4, found 8"),
+        ({"augment": Augment(rotation=10.0)}, r"augment\.rotation = 0\.0, found 10\.0"),
+        ({"extent": TrackMax(floor=0.1)}, r"extent\.settings\.floor = 0\.05, found 0\.1"),
+        ({"seed": 2}, "seed = 1, found 2"),
+    ],
+)  # fmt: skip
+def test_a_run_does_not_go_on_with_other_settings(config, reader, tmp_path, change, message):
+    config.resume = str(save(config, tmp_path, "detection"))
+    for name, value in change.items():
+        setattr(config, name, value)
+    with pytest.raises(ConfigError, match=rf"resume: .*detection-last\.ckpt began with .*{message}; repeat"):
+        check_resume(config, reader, tmp_path)
+
+
+def test_a_run_does_not_go_on_with_other_scans_in_another_folder_or_with_another_stage(config, reader, tmp_path):
+    config.resume = str(save(config, tmp_path, "membership"))
+    with pytest.raises(ConfigError, match=rf"expected the run's own folder, .*add hydra\.run\.dir={tmp_path}"):
+        check_resume(config, reader, tmp_path / "other")
+    (reader.root / "sequences/00/velodyne/000003.bin").unlink()
+    with pytest.raises(ConfigError, match="began with scans = 4, found 3"):
+        check_resume(config, SemanticKITTI(reader.root, reader.splits), tmp_path)
+    config.stage.run = ["detection"]
+    with pytest.raises(ConfigError, match="is of stage membership; expected one of detection"):
+        check_resume(config, reader, tmp_path)
+
+
+def test_a_missing_checkpoint_and_one_of_an_older_format_are_named(config, reader, tmp_path):
+    config.resume = str(tmp_path / "none.ckpt")
+    with pytest.raises(DataError, match=r"none\.ckpt: expected a checkpoint, found no file"):
+        check_resume(config, reader, tmp_path)
+    torch.save({"most": {"format": 1}, "state_dict": {}}, tmp_path / "none.ckpt")
+    with pytest.raises(DataError, match=rf"expected checkpoint format {FORMAT}, found 1"):
+        check_resume(config, reader, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"membership": Nearest()}, "expected one that stage 2 can train, such as full, found nearest"),
+        ({"trainer": TrainerSettings(accelerator="cpu", devices=5)}, "processes as split train has scans, 4, found 5"),
+        ({"stage": StageSettings(membership=MembershipTraining(batch_size=3)), "dataset": SemanticKITTISettings(batch_size=2)},
+         r"stage\.detection\.batch_size|stage\.membership\.batch_size: expected a multiple of 2"),
+    ],
+)  # fmt: skip
+def test_what_stage_2_cannot_do_is_refused_before_stage_1(config, reader, tmp_path, change, message):
+    for name, value in change.items():
+        setattr(config, name, value)
+    with pytest.raises(ConfigError, match=message):
+        stages_to_run(config, reader, tmp_path)
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
+def test_a_gpu_that_is_not_there_is_refused(config, reader, tmp_path):
+    for devices in (1, -1):
+        config.trainer = TrainerSettings(accelerator="gpu", devices=devices)
+        with pytest.raises(ConfigError, match=rf"no more GPUs than the 0 there are, found {devices}; trainer=cpu"):
+            stages_to_run(config, reader, tmp_path)
+
+
+def test_checkpoints_of_another_run_are_not_overwritten(config, reader, tmp_path):
+    kept = save(config, tmp_path, "detection")
+    with pytest.raises(ConfigError, match=rf"expected a folder without checkpoints, found {kept}; .*resume={kept}"):
+        stages_to_run(config, reader, tmp_path)
+
+
+def test_what_a_run_says_of_itself_is_plain(config):
+    said = describe_run(config, "membership", 4)
+    assert said["training"] == asdict(config.stage.membership)
