@@ -1,5 +1,6 @@
 """A network small enough to run in milliseconds, and windows of points for it."""
 
+from dataclasses import replace
 from typing import Any
 
 import torch
@@ -11,8 +12,8 @@ from most.datasets.taxonomy import Taxonomy
 from most.encoder import PointEncoder
 from most.heads import CentreHead, SemanticHead
 from most.inference import Inference, Predictor
-from most.membership import Nearest
-from most.structures import Instances, Sample
+from most.membership import Evidence, Nearest
+from most.structures import Detections, Instances, Sample
 from most.voxels import Grid
 
 TAXONOMY = Taxonomy.load("semantickitti")
@@ -69,6 +70,19 @@ def labelled(points: Tensor, semantics: Tensor, instance: Tensor) -> Sample:
         velocity_known=torch.ones(len(of), dtype=torch.bool),
     )
     return sample
+
+
+def known_evidence(predictor: Predictor, sample: Sample) -> Evidence:
+    """What an untrained stage 1 makes of a window, but for classes and detections: those are the truth's."""
+    truth = sample.instances
+    assert truth is not None
+    assert sample.semantics is not None
+    scores = torch.linspace(0.9, 0.5, len(truth))
+    found = Detections(truth.classes, scores, truth.centres, truth.extents, truth.velocities)
+    predictor.network.eval()
+    with torch.no_grad():
+        (evidence,) = predictor.see([sample])
+    return replace(evidence, semantics=sample.semantics, detections=found)
 
 
 def cloud(count: int, seed: int = 0) -> Tensor:

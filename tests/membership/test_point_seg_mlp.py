@@ -8,15 +8,15 @@ import torch
 
 from most.errors import ConfigError
 from most.inference import Prediction
-from most.membership import Channels, Evidence, Pairs, PointSegMLPSettings, RegionOfInterest
+from most.membership import Channels, Pairs, PointSegMLPSettings, RegionOfInterest
 from most.metrics.membership import membership_counts
 from most.simulation.scene import Scene
 from most.simulation.sensor import directions
 from most.simulation.settings import SensorSettings
 from most.simulation.vehicles import car
 from most.stages.membership import MembershipStage, MembershipTraining
-from most.structures import Detections, Sample
-from tiny import CAR, TAXONOMY, labelled, tiny_predictor
+from most.structures import Sample
+from tiny import CAR, TAXONOMY, known_evidence, labelled, tiny_predictor
 
 
 def touching_cars() -> Sample:
@@ -30,18 +30,6 @@ def touching_cars() -> Sample:
     points = torch.from_numpy(rays[seen] * hits.distance[seen, None]).float()
     instance = torch.from_numpy(hits.label[seen].astype(np.int64))
     return labelled(points, torch.full((len(points),), CAR), instance)
-
-
-def known_evidence(sample: Sample) -> Evidence:
-    """What an untrained stage 1 makes of a window, but for classes and detections: those are the truth's."""
-    truth = sample.instances
-    scores = torch.linspace(0.9, 0.5, len(truth))
-    found = Detections(truth.classes, scores, truth.centres, truth.extents, truth.velocities)
-    predictor = tiny_predictor()
-    predictor.network.eval()
-    with torch.no_grad():
-        (evidence,) = predictor.see([sample])
-    return replace(evidence, semantics=sample.semantics, detections=found)
 
 
 def accuracy(prediction: Prediction, sample: Sample) -> float:
@@ -64,7 +52,7 @@ def stage(settings: PointSegMLPSettings | None = None) -> MembershipStage:
 @pytest.mark.parametrize(("bev", "point"), [(True, True), (True, False), (False, False)])
 def test_it_learns_the_border_between_touching_cars_that_the_nearest_centre_gets_wrong(bev: bool, point: bool) -> None:
     sample = touching_cars()
-    evidence, made = known_evidence(sample), stage(PointSegMLPSettings([32, 32], bev, point)).train()
+    evidence, made = known_evidence(tiny_predictor(), sample), stage(PointSegMLPSettings([32, 32], bev, point)).train()
     assert accuracy(made.baseline.fuse(evidence), sample) < 0.95
     optimiser = torch.optim.SGD(made.membership.parameters(), lr=0.05, momentum=0.9)
     for _ in range(150):
@@ -93,7 +81,7 @@ def test_no_weight_or_statistic_of_stage_1_changes() -> None:
 
 def test_pairs_do_not_depend_on_each_other_once_trained() -> None:
     sample = touching_cars()
-    evidence, mlp = known_evidence(sample), stage().membership.eval()
+    evidence, mlp = known_evidence(tiny_predictor(), sample), stage().membership.eval()
     pairs = RegionOfInterest().pairs(evidence.points, evidence.semantics, evidence.detections)
     some = torch.randperm(len(pairs), generator=torch.Generator().manual_seed(0))[:100]
     with torch.no_grad():
@@ -104,7 +92,7 @@ def test_pairs_do_not_depend_on_each_other_once_trained() -> None:
 
 def test_without_pairs_there_is_nothing_to_rate_or_to_learn() -> None:
     sample = touching_cars()
-    evidence, made = known_evidence(sample), stage()
+    evidence, made = known_evidence(tiny_predictor(), sample), stage()
     nothing = replace(evidence, detections=evidence.detections.select(torch.zeros(0, dtype=torch.long)))
     none = Pairs(torch.zeros(0, dtype=torch.long), torch.zeros(0, dtype=torch.long))
     assert len(made.membership(nothing, none)) == 0
