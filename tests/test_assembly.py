@@ -125,7 +125,7 @@ OTHERS = {
     "another program's": (without("most"), "found one of another program; choose another"),
     "a description of another kind": (setting("most", value=7), "found one of another program"),
     "another format": (setting("most", "format", value=FORMAT + 1), f"format {FORMAT}, found {FORMAT + 1}; load it"),
-    "no run": (without("most_run"), "expected a whole checkpoint, found none of most_run"),
+    "no run": (without("most_run"), "a whole checkpoint, found none of most_run"),
     "no format": (setting("most", "format", value=None), f"format {FORMAT}, found None"),
     "unknown taxonomy": (setting("most", "taxonomy", "name", value="mars"), "found 'mars'.*train it again"),
     "other classes": (
@@ -140,7 +140,7 @@ OTHERS = {
     "later setting": (setting("most", "parts", "grid", "settings", "spin", value=1), "grid.*spin.*version that wrote"),
     "out of range": (setting("most", "parts", "grid", "settings", "voxel_size", value=[0.0] * 3), "voxel_size"),
     "a part less": (lambda content: content["most"]["parts"].pop("encoder"), "encoder.*train it again"),
-    "no weights": (without("state_dict"), "state_dict.*train it again"),
+    "no weights": (without("state_dict"), "a whole checkpoint, found none of state_dict"),
     "a weight less": (lambda content: content["state_dict"].popitem() and content["state_dict"].popitem(), "Missing"),
     "wider": (setting("most", "parts", "encoder", "settings", "widths", value=[8, 6]), "size mismatch.*train it"),
 }

@@ -138,7 +138,7 @@ def test_another_checkpoint_split_or_dataset_is_refused(tmp_path, checkpoint, re
         "tree": (SemanticKITTI(tmp_path / "elsewhere", reader.splits), "val"),
     }
     for other in others.values():
-        with pytest.raises(DataError, match="holds predictions of another checkpoint, dataset or split; choose anot"):
+        with pytest.raises(DataError, match="of another checkpoint, membership, dataset or split; choose anot"):
             claim_folder(out, checkpoint, *other, "trained")
     with pytest.raises(DataError, match="holds predictions of another checkpoint, membership"):
         claim_folder(out, checkpoint, reader, "val", "nearest")

@@ -109,7 +109,7 @@ def check_stage1(config: Config, taxonomy: Taxonomy) -> None:
 
 def _flat(settings: dict[str, Any], before: str = "") -> dict[str, Any]:
     """Nested settings by dotted names."""
-    flat = {}
+    flat: dict[str, Any] = {}
     for key, value in settings.items():
         flat |= _flat(value, f"{before}{key}.") if isinstance(value, dict) else {f"{before}{key}": value}
     return flat

@@ -1,10 +1,12 @@
 """Set reports side by side: ``python -m most.compare 'reports={nearest: a.json, full: b.json}'``."""
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import hydra
-from omegaconf import DictConfig
+from omegaconf import MISSING, DictConfig
 
 from most.config import conf_dir, register, store_root, typed
 from most.entry import run, start
@@ -16,11 +18,13 @@ from most.metrics.report import format_comparison, read_report
 class CompareConfig:
     """What ``most.compare`` is told."""
 
-    reports: dict[str, str] = field(default_factory=dict)  # a name for each file that most.evaluate or most.train wrote
+    reports: Any = MISSING  # a name for each file that most.evaluate or most.train wrote
 
     def __post_init__(self) -> None:
-        if not self.reports:
-            raise ConfigError("reports: expected names and files, such as 'reports={a: a.json, b: b.json}', found none")
+        if not isinstance(self.reports, Mapping) or not self.reports:
+            raise ConfigError(
+                f"reports: expected names and files, such as 'reports={{a: a.json, b: b.json}}', found {self.reports}"
+            )
 
 
 register()
@@ -29,7 +33,7 @@ store_root("compare", CompareConfig)
 
 def compare(config: CompareConfig) -> None:
     """Print a line for each report."""
-    print(format_comparison({name: read_report(Path(path)) for name, path in config.reports.items()}))
+    print(format_comparison({name: read_report(Path(str(path))) for name, path in config.reports.items()}))
 
 
 @hydra.main(version_base=None, config_path=str(conf_dir()), config_name="compare")

@@ -74,5 +74,5 @@ def test_gaussian_radius_is_centre_points():
     [("kind", "round"), ("min_variance", 0.0), ("min_overlap", 1.0), ("min_radius", -1), ("min_points", 0)],
 )
 def test_settings_out_of_range_are_refused(key, value):
-    with pytest.raises(ConfigError, match=rf"stage\.targets\.{key}: expected .*, found {value!r}"):
+    with pytest.raises(ConfigError, match=rf"stage\.detection\.targets\.{key}: expected .*, found {value!r}"):
         HeatmapTargets(**{key: value})

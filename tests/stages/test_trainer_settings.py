@@ -14,7 +14,7 @@ def test_batches_accumulate_to_the_effective_one(effective, per_step, expected):
 @pytest.mark.parametrize(("effective", "per_step"), [(8, 3), (8, 16)])
 def test_an_effective_batch_that_does_not_divide_is_refused(effective, per_step):
     with pytest.raises(
-        ConfigError, match=rf"stage\.detection\.batch_size: expected a multiple .*{per_step}, found {effective}"
+        ConfigError, match=rf"stage\.detection\.batch_size: expected a multiple of {per_step} .*found {effective}"
     ):
         TrainerSettings().accumulated(effective, per_step, "detection")
 

@@ -42,7 +42,7 @@ def standing(trainer: L.Trainer) -> tuple[int, int]:
     epochs, batches = trainer.fit_loop.epoch_progress.current, trainer.fit_loop.epoch_loop.batch_progress
     if batches.is_last_batch:
         return epochs.ready, 0
-    return epochs.processed, batches.current.processed
+    return epochs.processed, batches.current.processed  # type: ignore[attr-defined]  # of the tracker it is at run time
 
 
 class SemanticKITTIDataModule(L.LightningDataModule):
