@@ -20,7 +20,9 @@ def start(main: Callable[[], None]) -> None:
     try:
         run(main)
     except (HydraException, OmegaConfBaseException) as error:
-        _end(str(error), 2)
+        said = [line for line in str(error).splitlines() if not line.startswith("To append")]  # no key may be added
+        cause = str(error.__cause__).splitlines()[:1] if error.__cause__ else []
+        _end("\n".join([*said, *cause]), 2)
 
 
 def run(task: Callable[[], None]) -> None:
