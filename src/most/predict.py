@@ -27,12 +27,10 @@ class PredictConfig:
     out: str = MISSING
     split: str = "val"
     dataset: Any = None
-    membership: str = "trained"  # the checkpoint's own; nearest: by distance alone, to compare
+    nearest: bool = False  # leave stage 2 out: points go to the nearest centre
     device: str = "auto"  # auto: a GPU where there is one
 
     def __post_init__(self) -> None:
-        if self.membership not in ("trained", "nearest"):
-            raise ConfigError(f"membership: expected trained or nearest, found {self.membership}")
         self.chosen_device()
 
     def chosen_device(self) -> torch.device:
@@ -56,7 +54,7 @@ def predict(config: PredictConfig) -> None:
     )
     reader = SemanticKITTI(dataset.root, dataset.splits)
     frames = reader.frames(config.split)
-    claim_folder(out, checkpoint, reader, config.split, config.membership)
+    claim_folder(out, checkpoint, reader, config.split, "nearest" if config.nearest else "trained")
     frames = unfinished(reader, frames, out)
     windows = WindowDataset(reader, frames, trained.sweeps)
     loader = DataLoader(windows, dataset.batch_size, num_workers=dataset.workers, collate_fn=list)

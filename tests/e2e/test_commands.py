@@ -69,6 +69,20 @@ def test_predictions_cover_every_point_and_are_scored(run):
     for name in ("pq", "sq", "rq", "pq_things", "pq_dagger", "miou", "membership_accuracy"):
         assert scores[name] == (trained[name] and pytest.approx(trained[name], abs=1e-6)), name
 
+    done = most(run, "predict", f"checkpoint={MODEL}", "split=val", "out=nearest", "nearest=true",
+                "dataset=simulated", "dataset.root=streets", "dataset.workers=0", *SPLITS)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    done = most(run, "evaluate", "predictions=nearest", "split=val", "out=nearest.json", "dataset=simulated",
+                "dataset.root=streets", *SPLITS)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    nearest = json.loads((run / "nearest.json").read_text())["panoptic"]
+    trained = json.loads((run / "run" / "metrics.json").read_text())["panoptic_nearest"]
+    assert nearest["pq"] == pytest.approx(trained["pq"], abs=1e-6)
+
+    done = most(run, "compare", "reports={nearest: nearest.json, full: scores.json}")
+    assert done.returncode == 0, done.stderr
+    assert [line.split()[0] for line in done.stdout.splitlines()] == ["PQ", "nearest", "full"]
+
     done = most(run, "draw", "predictions=predictions", "sequence='01'", "index=1", "out=sweep.png",
                 "dataset=simulated", "dataset.root=streets", *SPLITS)  # fmt: skip
     assert done.returncode == 0, done.stderr
