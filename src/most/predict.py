@@ -49,9 +49,7 @@ def predict(config: PredictConfig) -> None:
     """Write ``sequences/NN/predictions/*.label`` and ``sequences/NN/detections/*.npz`` to the folder ``out``."""
     checkpoint, out, dataset = Path(config.checkpoint), Path(config.out), config.dataset
     trained = load_trained(checkpoint)
-    predictor = (
-        replace(trained.predictor, membership=Nearest()) if config.membership == "nearest" else trained.predictor
-    )
+    predictor = replace(trained.predictor, membership=Nearest()) if config.nearest else trained.predictor
     reader = SemanticKITTI(dataset.root, dataset.splits)
     frames = reader.frames(config.split)
     claim_folder(out, checkpoint, reader, config.split, "nearest" if config.nearest else "trained")
