@@ -64,7 +64,7 @@ def stage_of(backbone: str, reader: SemanticKITTI) -> DetectionStage:
     semantic = SemanticHead().build(19, trunk.voxel_channels, encoder.point_channels, trunk.bev_channels)
     network = Network(grid, encoder, trunk, CentreHead().build(trunk.bev_channels, 8), semantic)
     predictor = Predictor(network, taxonomy.things, taxonomy.stuff[0], Nearest(), Inference())
-    return DetectionStage(predictor, taxonomy, torch.ones(20, dtype=torch.long), DetectionTraining(), {})
+    return DetectionStage(predictor, taxonomy, torch.ones(20, dtype=torch.long), DetectionTraining(), {}, steps=1)
 
 
 def clocked(times: dict[str, list[float]], name: str, task: Callable) -> object:

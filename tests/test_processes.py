@@ -29,7 +29,7 @@ def shares() -> list[list[Sample]]:
 
 def detection(samples: list[Sample]) -> tuple[DetectionStage, dict[str, Tensor]]:
     predictor = tiny_predictor(encoder=PointEncoder([8, 16, 4]))
-    made = DetectionStage(predictor, TAXONOMY, torch.arange(20), DetectionTraining(), {})
+    made = DetectionStage(predictor, TAXONOMY, torch.arange(20), DetectionTraining(), {}, steps=1)
     return made, made.losses(samples, made.network(samples))
 
 

@@ -15,7 +15,10 @@ NO_RIGHT = (errno.EROFS, errno.EACCES, errno.EPERM)
 
 
 def start(main: Callable[[], None]) -> None:
-    """Run a command's main function: a configuration that does not compose is a mistake as well."""
+    """Run a command's main function: a configuration that does not compose is a mistake as well.
+
+    The command's own work goes through ``run`` inside it, before Hydra can add lines of its own to a message.
+    """
     os.environ.setdefault("HYDRA_FULL_ERROR", "1")  # else Hydra shortens every error, those of the program too
     try:
         run(main)

@@ -20,7 +20,7 @@ COUNTS = torch.arange(TAXONOMY.num_classes) * 100
 
 
 def stage(**settings):
-    made = DetectionStage(tiny_predictor(), TAXONOMY, COUNTS, DetectionTraining(**settings), {"most": {"format": 1}})
+    made = DetectionStage(tiny_predictor(), TAXONOMY, COUNTS, DetectionTraining(**settings), {"most": {"format": 1}}, 1)
     made.logged = {}
     made.log_dict = lambda values, **_: made.logged.update(values)
     return made

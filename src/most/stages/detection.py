@@ -63,7 +63,7 @@ class DetectionStage(L.LightningModule):
         class_counts: Int64[Tensor, "classes"],
         training: DetectionTraining,
         description: dict[str, Any],
-        steps: int = 1,
+        steps: int,
     ) -> None:
         """``class_counts`` are the training split's points of each class, void first.
 
