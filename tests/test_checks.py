@@ -46,7 +46,12 @@ def save(config: Config, folder: Path, stage: str) -> Path:
     parts = model_parts(config) | ({"membership": Nearest()} if stage == "detection" else {})
     path = folder / "checkpoints" / f"{stage}-last.ckpt"
     path.parent.mkdir(exist_ok=True)
-    content = {"most": describe(parts, TAXONOMY, 2), "most_run": describe_run(config, stage, 4), "state_dict": {}}
+    content = {
+        "most": describe(parts, TAXONOMY, 2),
+        "most_run": describe_run(config, stage, 4),
+        "state_dict": {},
+        "optimizer_states": [],
+    }
     torch.save(content, path)
     return path
 

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, distributed, multiprocessing
 
 from most.encoder import PointEncoder
-from most.membership import Channels, PointSegMLPSettings
+from most.membership import Channels, Mixing, PointSegMLPSettings
 from most.stages.detection import DetectionStage, DetectionTraining
 from most.stages.membership import MembershipStage, MembershipTraining
 from most.structures import Sample
@@ -33,12 +33,16 @@ def detection(samples: list[Sample]) -> tuple[DetectionStage, dict[str, Tensor]]
     return made, made.losses(samples, made.network(samples))
 
 
-def membership(samples: list[Sample]) -> tuple[MembershipStage, dict[str, Tensor]]:
+def membership(samples: list[Sample], mixing: Mixing | None = None) -> tuple[MembershipStage, dict[str, Tensor]]:
     predictor = tiny_predictor(encoder=PointEncoder([8, 16, 4]))
     mlp = PointSegMLPSettings([8, 8]).build(Channels(19, list(TAXONOMY.things), 4, 8))
-    made = MembershipStage(predictor, mlp, TAXONOMY, MembershipTraining(), {}).train()
-    evidence = [known_evidence(predictor, sample) for sample in samples]
-    return made, {"membership": made.loss(evidence, samples)}
+    made = MembershipStage(predictor, mlp, TAXONOMY, MembershipTraining(mixing=mixing or Mixing()), {}).train()
+    (pairs,) = made.steps([made.label(known_evidence(predictor, sample), sample) for sample in samples])
+    return made, {"membership": made.loss(pairs)}
+
+
+def mixed_membership(samples: list[Sample]) -> tuple[MembershipStage, dict[str, Tensor]]:
+    return membership(samples, Mixing(scans=3, steps=1, pairs=10**6))
 
 
 def gradients(make: Callable, samples: list[Sample]) -> tuple[dict[str, float], Gradients, Gradients]:
@@ -62,7 +66,7 @@ def share(rank: int, make: Callable, folder: Path) -> None:
     distributed.destroy_process_group()
 
 
-@pytest.mark.parametrize("make", [detection, membership])
+@pytest.mark.parametrize("make", [detection, membership, mixed_membership])
 def test_two_processes_with_uneven_shares_are_one_with_the_whole_batch(make: Callable, tmp_path: Path) -> None:
     losses, learned, state = gradients(make, [*itertools.chain(*shares())])
     multiprocessing.spawn(share, (make, tmp_path), WORLD)

@@ -74,14 +74,19 @@ def labelled(points: Tensor, semantics: Tensor, instance: Tensor) -> Sample:
 
 def known_evidence(predictor: Predictor, sample: Sample) -> Evidence:
     """What an untrained stage 1 makes of a window, but for classes and detections: those are the truth's."""
+    predictor.network.eval()
+    with torch.no_grad():
+        (evidence,) = predictor.see([sample])
+    return enlighten(evidence, sample)
+
+
+def enlighten(evidence: Evidence, sample: Sample) -> Evidence:
+    """The same with the truth's classes and detections."""
     truth = sample.instances
     assert truth is not None
     assert sample.semantics is not None
     scores = torch.linspace(0.9, 0.5, len(truth))
     found = Detections(truth.classes, scores, truth.centres, truth.extents, truth.velocities)
-    predictor.network.eval()
-    with torch.no_grad():
-        (evidence,) = predictor.see([sample])
     return replace(evidence, semantics=sample.semantics, detections=found)
 
 

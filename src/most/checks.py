@@ -12,6 +12,7 @@ from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError
 from most.membership import Nearest, PointSegMLPSettings
 from most.stages.trainer import TrainerSettings
+from most.training import batches_per_step
 
 STAGE1 = ("grid", "encoder", "backbone", "centre_head", "semantic_head")
 
@@ -28,7 +29,7 @@ def stages_to_run(config: Config, reader: Reader, folder: Path) -> list[str]:
                 f"found {config.trainer.processes()}"
             )
     for name in names:
-        config.trainer.accumulated(getattr(config.stage, name).batch_size, config.dataset.batch_size, name)
+        batches_per_step(config, name)
     if "membership" in names and not isinstance(config.membership, PointSegMLPSettings):
         raise ConfigError(
             "membership: expected one that stage 2 can train, such as full, found nearest; with it say stage=detection"
@@ -63,6 +64,10 @@ def check_resume(config: Config, reader: Reader, folder: Path) -> str:
     """Return the stage that a run goes on with; refuse another model, other settings, or another folder."""
     path = Path(str(config.resume))
     saved = read_checkpoint(path)
+    if "optimizer_states" not in saved:
+        raise ConfigError(
+            f"resume: expected a checkpoint to go on from, such as STAGE-last.ckpt, found weights alone: {path}"
+        )
     stage: str = saved["most_run"]["stage"]
     if stage not in config.stage.run:
         raise ConfigError(f"resume: {path} is of stage {stage}; expected one of {', '.join(config.stage.run)}")

@@ -29,6 +29,20 @@ def count(items: int, device: torch.device) -> int:
     return items if processes() == 1 else int(total(torch.tensor(items, device=device)))
 
 
+def rank() -> int:
+    """Which of the processes this is."""
+    return distributed.get_rank() if processes() > 1 else 0
+
+
+def everyones(items: list[Any]) -> list[Any]:
+    """Join what each process has, in the order of the processes; tensors are expected on the CPU."""
+    if processes() == 1:
+        return items
+    shares: list[list[Any]] = [[] for _ in range(processes())]
+    distributed.all_gather_object(shares, items)
+    return [item for share in shares for item in share]
+
+
 def summed(values: Tensor) -> Tensor:
     """Sum over all processes; its gradient is the sum of theirs."""
     if processes() == 1:

@@ -17,7 +17,14 @@ from most.config import Config, conf_dir, register, typed
 from most.datasets.datamodule import SemanticKITTIDataModule
 from most.entry import run, start
 from most.metrics.report import write_report
-from most.training import Stage, build_detection, build_membership_stage, build_trainer, handed_over
+from most.training import (
+    Stage,
+    batches_per_step,
+    build_detection,
+    build_membership_stage,
+    build_trainer,
+    handed_over,
+)
 
 register()
 
@@ -48,9 +55,11 @@ def run_stage(
     stage: Stage
     if name == "detection":
         stage = build_detection(config, data)
+        data.training_batch = config.dataset.batch_size
     else:
         stage1 = resume or config.stage1 or handed_over(config, folder)
         stage = build_membership_stage(config, Path(stage1), data.reader)
+        data.training_batch = config.dataset.batch_size * batches_per_step(config, name)
     trainer = build_trainer(config, stage, folder, logger)
     trainer.fit(stage, datamodule=data, ckpt_path=resume, weights_only=True)
     if stage.report.get("epochs") != stage.training_settings.epochs:

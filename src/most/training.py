@@ -48,8 +48,13 @@ def build_detection(config: Config, data: SemanticKITTIDataModule) -> DetectionS
 def steps_per_epoch(config: Config, scans: int) -> int:
     """Return the optimiser's steps in an epoch of stage 1; Lightning's own count would make the loaders too early."""
     batches = math.ceil(math.ceil(scans / config.trainer.processes()) / config.dataset.batch_size)
-    together = config.trainer.accumulated(config.stage.detection.batch_size, config.dataset.batch_size, "detection")
-    return math.ceil(batches / together)
+    return math.ceil(batches / batches_per_step(config, "detection"))
+
+
+def batches_per_step(config: Config, stage: str) -> int:
+    """Return how many batches of each process a stage takes in before its optimiser steps."""
+    effective = getattr(config.stage, stage).batch_size
+    return config.trainer.accumulated(effective, config.dataset.batch_size, stage)
 
 
 def build_membership_stage(config: Config, stage1: Path, reader: Reader) -> MembershipStage:
@@ -58,9 +63,8 @@ def build_membership_stage(config: Config, stage1: Path, reader: Reader) -> Memb
     predictor = replace(load_trained(stage1).predictor, settings=config.inference)
     membership = build_membership(parts, predictor.network, taxonomy)
     assert isinstance(membership, PointSegMLP)  # most.checks
-    return MembershipStage(
-        predictor, membership, taxonomy, config.stage.membership, _notes(config, "membership", parts, reader)
-    )
+    notes = _notes(config, "membership", parts, reader)
+    return MembershipStage(predictor, membership, taxonomy, config.stage.membership, notes, config.seed)
 
 
 def _notes(config: Config, stage: str, parts: dict[str, Any], reader: Reader) -> dict[str, Any]:
@@ -84,15 +88,13 @@ def handed_over(config: Config, folder: Path) -> Path:
 
 def build_trainer(config: Config, stage: Stage, folder: Path, logger: Logger | bool) -> L.Trainer:
     """Make Lightning's trainer from our settings."""
-    settings, training = config.trainer, stage.training_settings
+    settings = config.trainer
     return L.Trainer(
         accelerator=settings.accelerator,
         devices=settings.devices,
         strategy=settings.strategy,
         precision=settings.chosen_precision(),
-        max_epochs=training.epochs,
-        accumulate_grad_batches=settings.accumulated(training.batch_size, config.dataset.batch_size, stage.name),
-        gradient_clip_val=training.clip,
+        max_epochs=stage.training_settings.epochs,
         check_val_every_n_epoch=settings.validate_every,
         log_every_n_steps=settings.log_every,
         num_sanity_val_steps=0,
@@ -103,7 +105,16 @@ def build_trainer(config: Config, stage: Stage, folder: Path, logger: Logger | b
         enable_progress_bar=settings.progress_bar,
         enable_model_summary=False,
         default_root_dir=folder,
+        **_steps(config, stage),
     )
+
+
+def _steps(config: Config, stage: Stage) -> dict[str, Any]:
+    """Return what Lightning does with stage 1's gradients; stage 2 gets its batches joined, and steps by itself."""
+    if isinstance(stage, MembershipStage):
+        return {}
+    clip = stage.training_settings.clip
+    return {"accumulate_grad_batches": batches_per_step(config, "detection"), "gradient_clip_val": clip}
 
 
 def _callbacks(config: Config, stage: Stage, folder: Path) -> list[Callback]:
@@ -114,6 +125,7 @@ def _callbacks(config: Config, stage: Stage, folder: Path) -> list[Callback]:
             best.stem,
             monitor=f"{stage.prefix}val/pq",
             mode="max",
+            save_weights_only=True,  # it is to be used, not to be gone on from
             save_on_train_epoch_end=False,
             enable_version_counter=False,
         ),

@@ -64,7 +64,8 @@ def test_stage_2_follows_on_the_best_stage_1():
     stage = recipe().stage
     assert (stage.run, stage.hand_over) == (["detection", "membership"], "best")
     second = stage.membership
-    assert (second.lr, second.momentum, second.epochs, second.batch_size, second.clip) == (5e-4, 0.9, 20, 8, None)
+    assert (second.lr, second.momentum, second.epochs, second.batch_size) == (5e-4, 0.9, 20, 8)
+    assert second.mixing.scans == 0
 
 
 def test_losses_and_targets():

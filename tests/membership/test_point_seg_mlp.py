@@ -1,14 +1,17 @@
 """PointSegMLP: what it sees, and that it learns what the nearest centre gets wrong."""
 
 from dataclasses import replace
+from typing import Any
 
+import lightning as L
 import numpy as np
 import pytest
 import torch
+from torch.utils.data import DataLoader
 
 from most.errors import ConfigError
-from most.inference import Prediction
-from most.membership import Channels, Pairs, PointSegMLPSettings, RegionOfInterest
+from most.inference import Prediction, Predictor
+from most.membership import Channels, Evidence, Mixing, Pairs, PointSegMLPSettings, RegionOfInterest
 from most.metrics.membership import membership_counts
 from most.simulation.scene import Scene
 from most.simulation.sensor import directions
@@ -16,7 +19,7 @@ from most.simulation.settings import SensorSettings
 from most.simulation.vehicles import car
 from most.stages.membership import MembershipStage, MembershipTraining
 from most.structures import Sample
-from tiny import CAR, TAXONOMY, known_evidence, labelled, tiny_predictor
+from tiny import CAR, TAXONOMY, enlighten, known_evidence, labelled, tiny_predictor
 
 
 def touching_cars() -> Sample:
@@ -41,12 +44,12 @@ def accuracy(prediction: Prediction, sample: Sample) -> float:
     return counts.accuracies()["membership_accuracy"]
 
 
-def stage(settings: PointSegMLPSettings | None = None) -> MembershipStage:
+def stage(settings: PointSegMLPSettings | None = None, **training: Any) -> MembershipStage:
     predictor = tiny_predictor()
     channels = Channels(TAXONOMY.num_classes - 1, list(TAXONOMY.things), 4, 8)
     torch.manual_seed(0)
     mlp = (settings or PointSegMLPSettings([16, 16])).build(channels)
-    return MembershipStage(predictor, mlp, TAXONOMY, MembershipTraining(), {})
+    return MembershipStage(predictor, mlp, TAXONOMY, MembershipTraining(**training), {})
 
 
 @pytest.mark.parametrize(("bev", "point"), [(True, True), (True, False), (False, False)])
@@ -54,29 +57,52 @@ def test_it_learns_the_border_between_touching_cars_that_the_nearest_centre_gets
     sample = touching_cars()
     evidence, made = known_evidence(tiny_predictor(), sample), stage(PointSegMLPSettings([32, 32], bev, point)).train()
     assert accuracy(made.baseline.fuse(evidence), sample) < 0.95
-    optimiser = torch.optim.SGD(made.membership.parameters(), lr=0.05, momentum=0.9)
+    optimiser = torch.optim.SGD(made.learner.parameters(), lr=0.05, momentum=0.9)
+    pairs = made.label(evidence, sample)
     for _ in range(150):
         optimiser.zero_grad()
-        made.loss([evidence], [sample]).backward()
+        made.loss(pairs).backward()
         optimiser.step()
+    made.follow()
     made.eval()
     with torch.no_grad():
         assert accuracy(made.predictor.fuse(evidence), sample) >= 0.99
 
 
+class Knowing(Predictor):
+    """Runs stage 1, untrained as it is, and then sees the truth."""
+
+    def see(self, samples: list[Sample]) -> list[Evidence]:
+        return list(map(enlighten, super().see(samples), samples))
+
+
 def test_no_weight_or_statistic_of_stage_1_changes() -> None:
-    made, sample = stage(), touching_cars()
-    before = {key: value.clone() for key, value in made.network.state_dict().items()}
-    made.log = lambda *_, **__: None
+    made, sample = stage(mixing=Mixing(scans=2, steps=3)), touching_cars()
+    made.predictor = Knowing(**vars(made.predictor))
+    before, mlp = (
+        {key: value.clone() for key, value in part.state_dict().items()} for part in (made.network, made.membership)
+    )
+    trainer = L.Trainer(
+        accelerator="cpu", max_epochs=3, logger=False, enable_checkpointing=False, enable_progress_bar=False,
+        enable_model_summary=False,
+    )  # fmt: skip
+    trainer.fit(made, DataLoader([sample], collate_fn=list))
+    assert trainer.global_step == 9
+    assert any(not torch.equal(value, mlp[key]) for key, value in made.membership.state_dict().items())
     made.train()
-    (optimiser,) = [made.configure_optimizers()]
-    for _ in range(3):
-        optimiser.zero_grad()
-        made.training_step([sample], 0).backward()
-        optimiser.step()
     assert not made.network.training
     assert not any(weight.requires_grad or weight.grad is not None for weight in made.network.parameters())
     assert all(torch.equal(value, before[key]) for key, value in made.network.state_dict().items())
+
+
+@pytest.mark.parametrize(("average", "mean"), [(0.0, 4.0), (0.5, 2.75)])
+def test_what_predicts_is_the_running_mean_of_what_is_learned(average: float, mean: float) -> None:
+    """Of 1, 2 and 4: the plain mean of the first two, then half of it and half of the last."""
+    made = stage(average=average)
+    for learned in (1.0, 2.0, 4.0):
+        torch.nn.init.constant_(made.learner.out.bias, learned)
+        made.follow()
+    assert made.membership.out.bias.item() == mean
 
 
 def test_pairs_do_not_depend_on_each_other_once_trained() -> None:
@@ -96,7 +122,7 @@ def test_without_pairs_there_is_nothing_to_rate_or_to_learn() -> None:
     nothing = replace(evidence, detections=evidence.detections.select(torch.zeros(0, dtype=torch.long)))
     none = Pairs(torch.zeros(0, dtype=torch.long), torch.zeros(0, dtype=torch.long))
     assert len(made.membership(nothing, none)) == 0
-    loss = made.loss([nothing], [sample])
+    loss = made.loss(made.label(nothing, sample))
     loss.backward()
     assert loss == 0
 

@@ -59,6 +59,7 @@ class SemanticKITTIDataModule(L.LightningDataModule):
         self.settings = settings
         self.augment = augment
         self.seed = seed
+        self.training_batch = settings.batch_size  # samples; a stage whose steps take several batches joins them
         self.reader = SemanticKITTI(settings.root, settings.splits)
         self.instances = InstanceTables(self.reader, extent, settings.tables)
 
@@ -78,7 +79,8 @@ class SemanticKITTIDataModule(L.LightningDataModule):
         """Shuffled, augmented windows, from where the trainer stands on."""
         dataset = self.dataset("train", self.augment)
         epoch, batches = standing(self.trainer) if self.trainer else (0, 0)
-        return self._loader(dataset, EpochSampler(dataset, self.seed, epoch, batches * self.settings.batch_size))
+        sampler = EpochSampler(dataset, self.seed, epoch, batches * self.training_batch)
+        return self._loader(dataset, sampler, self.training_batch)
 
     def val_dataloader(self) -> DataLoader[Sample]:
         """The validation split in order."""
@@ -95,12 +97,14 @@ class SemanticKITTIDataModule(L.LightningDataModule):
     def loader(self, split: str) -> DataLoader[Sample]:
         """Any split in order, not augmented."""
         dataset = self.dataset(split)
-        return self._loader(dataset, OrderedSampler(dataset))
+        return self._loader(dataset, OrderedSampler(dataset), self.settings.batch_size)
 
-    def _loader(self, dataset: WindowDataset, sampler: EpochSampler | OrderedSampler) -> DataLoader[Sample]:
+    def _loader(
+        self, dataset: WindowDataset, sampler: EpochSampler | OrderedSampler, batch_size: int
+    ) -> DataLoader[Sample]:
         return DataLoader(
             dataset,
-            self.settings.batch_size,
+            batch_size,
             sampler=sampler,
             num_workers=self.settings.workers,
             persistent_workers=self.settings.workers > 0,

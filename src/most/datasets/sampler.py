@@ -3,18 +3,17 @@
 from collections.abc import Iterator
 
 import numpy as np
-from torch import distributed
 from torch.utils.data import Sampler
 
 from most.datasets.dataset import WindowDataset
-from most.processes import processes
+from most.processes import processes, rank
 
 
 class OrderedSampler(Sampler[int]):
     """A dataset in order, shared out among the processes of a distributed run: none twice, so shares may be uneven."""
 
     def __init__(self, dataset: WindowDataset) -> None:
-        self.indices = range(len(dataset))[_rank() :: processes()]
+        self.indices = range(len(dataset))[rank() :: processes()]
 
     def __len__(self) -> int:
         return len(self.indices)
@@ -35,7 +34,7 @@ class EpochSampler(Sampler[int]):
         self.dataset = dataset
         self.seed = seed
         self.done = done
-        self.rank, self.processes = _rank(), processes()
+        self.rank, self.processes = rank(), processes()
         self.set_epoch(epoch)
 
     def set_epoch(self, epoch: int) -> None:
@@ -51,7 +50,3 @@ class EpochSampler(Sampler[int]):
         share = np.arange(self.rank, len(self) * self.processes, self.processes) % len(self.dataset)
         done, self.done = self.done, 0
         return iter(order[share][done:].tolist())
-
-
-def _rank() -> int:
-    return distributed.get_rank() if processes() > 1 else 0

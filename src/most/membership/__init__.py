@@ -4,12 +4,16 @@ from most.membership.evidence import Channels, Evidence
 from most.membership.matching import match_detections, pair_targets
 from most.membership.nearest import Nearest
 from most.membership.point_seg_mlp import PointSegMLP, PointSegMLPSettings
+from most.membership.pool import LabelledPairs, Mixing, PairPool
 from most.membership.roi import Pairs, RegionOfInterest
 
 __all__ = [
     "Channels",
     "Evidence",
+    "LabelledPairs",
+    "Mixing",
     "Nearest",
+    "PairPool",
     "Pairs",
     "PointSegMLP",
     "PointSegMLPSettings",
