@@ -35,16 +35,21 @@ def test_training_leaves_metrics_checkpoints_and_pictures(run):
         assert list((run / "run" / "pictures" / stage).rglob("*.png"))
 
 
-def test_the_offline_wandb_run_holds_losses_metrics_rate_throughput_and_pictures(run):
+def test_the_offline_wandb_run_holds_configuration_losses_metrics_rate_throughput_and_pictures(run):
     (binary,) = (run / "run" / "wandb").glob("offline-run-*/*.wandb")
     done = subprocess.run(
         [sys.executable, "-m", "wandb", "leet", "inspect", "--json", str(binary)],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    for key in ("train/loss_heatmap", "train/loss_voxel", "val/pq", "val/miou", "lr-Adam", "scans_per_second", "bev_",
-                "membership/train/loss", "membership/val/pq", "membership/val/nearest_pq", "lr-SGD"):  # fmt: skip
+    for key in ("train/loss_heatmap", "train/loss_voxel", "val/pq", "val/miou", "lr-Adam", "scans_per_second",
+                "images/val/bev_", "images/membership/val/bev_", "membership/train/loss", "membership/val/pq",
+                "membership/val/nearest_pq", "lr-SGD"):  # fmt: skip
         assert key in done.stdout, key
+    (settings,) = (record["run"]["config"]["update"] for record in map(json.loads, done.stdout.splitlines())
+                   if "config" in record.get("run", {}))  # fmt: skip
+    assert settings["stage"]["membership"]["epochs"] == 2
+    assert settings["backbone"]["widths"] == [4, 4, 8, 8]
 
 
 def test_predictions_cover_every_point_and_are_scored(run):
