@@ -17,14 +17,7 @@ from most.config import Config, conf_dir, register, typed
 from most.datasets.datamodule import SemanticKITTIDataModule
 from most.entry import run, start
 from most.metrics.report import write_report
-from most.training import (
-    Stage,
-    batches_per_step,
-    build_detection,
-    build_membership_stage,
-    build_trainer,
-    handed_over,
-)
+from most.training import build_stage, build_trainer, handed_over
 
 register()
 
@@ -52,17 +45,10 @@ def run_stage(
 ) -> None:
     """Train one stage from its beginning, or from a checkpoint, to its end, and write what it reached."""
     L.seed_everything(config.seed, workers=True)
-    stage: Stage
-    if name == "detection":
-        stage = build_detection(config, data)
-        data.training_batch = config.dataset.batch_size
-    else:
-        stage1 = resume or config.stage1 or handed_over(config, folder)
-        stage = build_membership_stage(config, Path(stage1), data.reader)
-        data.training_batch = config.dataset.batch_size * batches_per_step(config, name)
+    stage = build_stage(name, config, data, Path(resume or config.stage1 or handed_over(config, folder)))
     trainer = build_trainer(config, stage, folder, logger)
     trainer.fit(stage, datamodule=data, ckpt_path=resume, weights_only=True)
-    if stage.report.get("epochs") != stage.training_settings.epochs:
+    if stage.report.get("epochs") != stage.epochs:
         trainer.validate(stage, datamodule=data, verbose=False)
     if trainer.is_global_zero:
         write_report(folder / "metrics.json", stage.report)

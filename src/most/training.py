@@ -28,9 +28,17 @@ from most.stages.callbacks import Throughput
 from most.stages.checkpoints import AtomicCheckpointIO, LastCheckpoint
 from most.stages.detection import DetectionStage
 from most.stages.membership import MembershipStage
+from most.stages.stage import Stage
 from most.viz.callback import BevPictures
 
-Stage = DetectionStage | MembershipStage
+
+def build_stage(name: str, config: Config, data: SemanticKITTIDataModule, stage1: Path) -> Stage:
+    """Make a stage, and tell the data how large its batches are; ``stage1`` is read for stage 2 alone."""
+    if name == "detection":
+        data.training_batch = config.dataset.batch_size
+        return build_detection(config, data)
+    data.training_batch = config.dataset.batch_size * batches_per_step(config, name)
+    return build_membership_stage(config, stage1, data.reader)
 
 
 def build_detection(config: Config, data: SemanticKITTIDataModule) -> DetectionStage:
@@ -94,7 +102,7 @@ def build_trainer(config: Config, stage: Stage, folder: Path, logger: Logger | b
         devices=settings.devices,
         strategy=settings.strategy,
         precision=settings.chosen_precision(),
-        max_epochs=stage.training_settings.epochs,
+        max_epochs=stage.epochs,
         check_val_every_n_epoch=settings.validate_every,
         log_every_n_steps=settings.log_every,
         num_sanity_val_steps=0,
@@ -111,10 +119,10 @@ def build_trainer(config: Config, stage: Stage, folder: Path, logger: Logger | b
 
 def _steps(config: Config, stage: Stage) -> dict[str, Any]:
     """Return what Lightning does with stage 1's gradients; stage 2 gets its batches joined, and steps by itself."""
-    if isinstance(stage, MembershipStage):
+    if not isinstance(stage, DetectionStage):
         return {}
     clip = stage.training_settings.clip
-    return {"accumulate_grad_batches": batches_per_step(config, "detection"), "gradient_clip_val": clip}
+    return {"accumulate_grad_batches": batches_per_step(config, stage.name), "gradient_clip_val": clip}
 
 
 def _callbacks(config: Config, stage: Stage, folder: Path) -> list[Callback]:

@@ -4,7 +4,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-import lightning as L
 import torch
 from jaxtyping import Float, Int64
 from lightning.pytorch.utilities.types import OptimizerLRSchedulerConfig
@@ -12,13 +11,14 @@ from torch import Tensor
 
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError
-from most.inference import Prediction, Predictor
+from most.inference import Predictor
 from most.losses import LossWeights, class_weights, focal_loss, lovasz_loss, regression_losses, semantic_loss
 from most.modal.heatmap import HeatmapTargets
 from most.modal.targets import bev_targets
 from most.modal.voxel_labels import majority
 from most.network import Network, NetworkOutput
 from most.stages.scores import Scores
+from most.stages.stage import Stage
 from most.structures import Sample
 
 
@@ -49,11 +49,10 @@ class DetectionTraining:
             raise ConfigError(f"stage.detection.weight_decay: expected a number >= 0, found {self.weight_decay}")
 
 
-class DetectionStage(L.LightningModule):
+class DetectionStage(Stage):
     """Wires network, targets, losses and metrics."""
 
-    name = "detection"
-    prefix = ""  # of the names under which losses and figures are logged
+    name, prefix = "detection", ""
     class_weights: Tensor
 
     def __init__(
@@ -68,19 +67,14 @@ class DetectionStage(L.LightningModule):
         """``class_counts`` are the training split's points of each class, void first.
 
         ``steps`` counts those of the optimiser in the whole training.
-        ``description`` goes into the checkpoints: plain types that say how to make the network again.
         """
-        super().__init__()
+        super().__init__(predictor, taxonomy, description, training.epochs)
         self.network = predictor.network
-        self.predictor = predictor
-        self.taxonomy = taxonomy
         self.training_settings = training
-        self.description = description
         self.steps = steps
         weights = class_weights(class_counts[1:], training.losses.class_balance)
         self.register_buffer("class_weights", weights, persistent=False)
         self.scores = Scores(taxonomy)
-        self.report: dict[str, Any] = {}  # the last validation's figures
 
     def losses(self, samples: list[Sample], output: NetworkOutput) -> dict[str, Float[Tensor, ""]]:
         """Return each loss, unweighted (Eq. 1, 2, 4)."""
@@ -121,19 +115,8 @@ class DetectionStage(L.LightningModule):
         return {"predictions": predictions}
 
     def on_validation_epoch_end(self) -> None:
-        """Log the split's figures, fractions in [0, 1]."""
-        epochs = self.current_epoch + int(self.trainer.state.fn == "fit")  # the running one is not counted yet
-        figures = self.scores.take()
-        self.report = {"epochs": epochs, "panoptic": figures}
-        self.log_dict({f"val/{name}": value for name, value in figures.items() if name != "per_class"})
-
-    def predict_step(self, samples: list[Sample], _: int) -> list[Prediction]:
-        """Label every point of a batch's current sweeps."""
-        return self.predictor(samples)
-
-    def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
-        """Add what it takes to make the network again."""
-        checkpoint.update(self.description)
+        """Score the split."""
+        self.publish(panoptic=self.scores.take())
 
     def configure_optimizers(self) -> OptimizerLRSchedulerConfig:
         """See :func:`one_cycle`."""

@@ -5,7 +5,6 @@ from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import lightning as L
 import torch
 import torch.nn.functional as F
 from jaxtyping import Float
@@ -14,7 +13,7 @@ from torch import Tensor
 
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError
-from most.inference import Prediction, Predictor
+from most.inference import Predictor
 from most.membership import (
     Evidence,
     LabelledPairs,
@@ -27,6 +26,7 @@ from most.membership import (
 )
 from most.processes import mean_over_all
 from most.stages.scores import Scores
+from most.stages.stage import Stage
 from most.structures import Sample
 
 
@@ -50,11 +50,10 @@ class MembershipTraining:
                 raise ConfigError(f"stage.membership.{name}: expected a number in [0, 1), found {getattr(self, name)}")
 
 
-class MembershipStage(L.LightningModule):
+class MembershipStage(Stage):
     """Trains on exactly the pairs that inference sees; no weight or running statistic of stage 1 changes."""
 
-    name = "membership"
-    prefix = "membership/"  # of the names under which losses and figures are logged
+    name, prefix = "membership", "membership/"
     followed: Tensor
 
     def __init__(
@@ -66,24 +65,18 @@ class MembershipStage(L.LightningModule):
         description: dict[str, Any],
         seed: int = 0,
     ) -> None:
-        """``predictor`` is stage 1; ``description`` goes into the checkpoints, see :class:`DetectionStage`.
-
-        ``seed`` fixes which pairs are mixed.
-        """
-        super().__init__()
+        """``predictor`` is stage 1; ``seed`` fixes which pairs are mixed."""
+        membership = deepcopy(mlp).requires_grad_(False)
+        super().__init__(replace(predictor, membership=membership), taxonomy, description, training.epochs)
         self.automatic_optimization = False  # a batch of scans can be good for several steps
         self.pool = PairPool(training.mixing, seed)
         self.network = predictor.network.eval().requires_grad_(False)
         self.learner = mlp
-        self.membership = deepcopy(mlp).requires_grad_(False)  # the running mean of what is learned
-        self.predictor = replace(predictor, membership=self.membership)
+        self.membership = membership  # the running mean of what is learned
         self.baseline = replace(predictor, membership=Nearest())
-        self.taxonomy = taxonomy
         self.training_settings = training
-        self.description = description
         self.register_buffer("followed", torch.zeros((), dtype=torch.long))  # steps
         self.scores, self.baseline_scores = Scores(taxonomy), Scores(taxonomy)
-        self.report: dict[str, Any] = {}  # the last validation's figures
 
     def train(self, mode: bool = True) -> "MembershipStage":
         """Stage 1 stays in eval mode."""
@@ -151,22 +144,12 @@ class MembershipStage(L.LightningModule):
         return {"predictions": predictions}
 
     def on_validation_epoch_end(self) -> None:
-        """Log the split's figures, fractions in [0, 1], and beside them those of the nearest centre."""
-        epochs = self.current_epoch + int(self.trainer.state.fn == "fit")  # the running one is not counted yet
-        figures, baseline = self.scores.take(), self.baseline_scores.take()
-        self.report = {"epochs": epochs, "panoptic": figures, "panoptic_nearest": baseline}
-        self.log_dict({f"{self.prefix}val/{name}": value for name, value in figures.items() if name != "per_class"})
-        self.log_dict(
-            {f"{self.prefix}val/nearest_{name}": value for name, value in baseline.items() if name != "per_class"}
-        )
-
-    def predict_step(self, samples: list[Sample], _: int) -> list[Prediction]:
-        """Label every point of a batch's current sweeps."""
-        return self.predictor(samples)
+        """Score the split, and beside it the nearest centre's labels."""
+        self.publish(panoptic=self.scores.take(), panoptic_nearest=self.baseline_scores.take())
 
     def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
-        """Add what it takes to make both networks again and, beside the optimiser's state, to go on exactly."""
-        checkpoint.update(self.description)
+        """Add the pairs that were kept, where the checkpoint is one to go on from."""
+        super().on_save_checkpoint(checkpoint)
         if "optimizer_states" in checkpoint:
             checkpoint["pool"] = self.pool.state()
 
