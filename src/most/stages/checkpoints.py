@@ -96,7 +96,7 @@ class LastCheckpoint(Callback):
         print("\nmost: stopping after this step; once more to stop at once", flush=True)
 
     def _save(self, trainer: L.Trainer) -> None:
-        trainer.save_checkpoint(self.path)
+        trainer.save_checkpoint(self.path, weights_only=False)
         self.saved = time.monotonic()
 
     def _stop(self, trainer: L.Trainer) -> None:
