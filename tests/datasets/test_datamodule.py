@@ -8,9 +8,9 @@ from lightning.pytorch.callbacks import Callback
 from omegaconf import OmegaConf
 
 from most.datasets.augment import Augment
-from most.datasets.datamodule import SemanticKITTIDataModule, SemanticKITTISettings
+from most.datasets.datamodule import SemanticKITTIDataModule
 from most.datasets.sampler import EpochSampler, OrderedSampler
-from most.datasets.semantickitti import Splits
+from most.datasets.semantickitti import SemanticKITTISettings, Splits
 from most.errors import ConfigError, DataError
 from most.modal.extent import ShrinkWrap
 from most.structures import Sample
@@ -19,7 +19,7 @@ from most.structures import Sample
 def module(tree: Path, **options: object) -> SemanticKITTIDataModule:
     splits = Splits(train=["00"], val=["08"], test=["11"])
     chosen = {"workers": 0, "sweeps": 1, "tables": str(tree / "tables")} | options
-    settings = SemanticKITTISettings(str(tree), splits, **chosen)  # type: ignore[arg-type]
+    settings = SemanticKITTISettings(str(tree), splits=splits, **chosen)  # type: ignore[arg-type]
     return SemanticKITTIDataModule(settings, Augment(rotation=45.0), ShrinkWrap(), seed=3)
 
 
