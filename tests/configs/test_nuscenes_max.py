@@ -1,13 +1,17 @@
 """``+experiment=nuscenes_max``, unmodified, is the paper's recipe on Panoptic nuScenes."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
+import torch
 from hydra import compose, initialize_config_dir
 
 from most.assembly import build_network, model_parts
 from most.config import Config, conf_dir, register, typed
+from most.datasets.datamodule import SweepDataModule
 from most.datasets.nuscenes import NuScenesSettings, SceneSplits
+from most.simulation import SensorSettings, SimulationSettings, simulate
 
 
 def recipe(name: str, *overrides: str) -> Config:
@@ -49,3 +53,17 @@ def test_scenes_on_the_command_line() -> None:
         ["scene-1072"],
         None,
     )
+
+
+def test_simulated_scenes_become_batches(tmp_path: Path) -> None:
+    sensor = SensorSettings([-30.0], [10.0], [16], columns=90, max_range=30.0, labelled_range=100.0)
+    simulate(SimulationSettings(["scene-0001"], 11, sensor=sensor, layout="nuscenes"), tmp_path / "tree")
+    changes = [f"dataset.root={tmp_path / 'tree'}", f"dataset.tables={tmp_path / 'tables'}", "dataset.workers=0"]
+    config = recipe("nuscenes_max", *changes, "dataset.splits.train=[scene-0001]", "dataset.splits.val=[scene-0001]")
+    data = SweepDataModule(config.dataset, config.augment, config.extent, config.seed)
+    samples = [sample for batch in data.val_dataloader() for sample in batch]
+    assert [sample.index for sample in samples] == [0, 10]
+    ages = samples[1].points[:, 4].unique()
+    torch.testing.assert_close(ages, torch.arange(-10, 1) * 0.05, atol=1e-5, rtol=0)
+    assert len(samples[1].instances) > 0
+    assert {sample.index for batch in data.train_dataloader() for sample in batch} == {0, 10}
