@@ -183,8 +183,8 @@ class PanopticNuScenes:
         scenes = f"{', '.join(wanted[:3])} ..." if wanted else f"{self.version} has none"
         return (
             f"{self.folder}: expected scenes of the split {split} ({scenes}), found none of them.\n"
-            "The tree holds {version}/*.json, samples/LIDAR_TOP, sweeps/LIDAR_TOP and panoptic/{version}; training and "
-            "validation scenes are in dataset.version=v1.0-trainval (or v1.0-mini), test scenes in v1.0-test.\n"
+            f"The tree holds {self.version}/*.json, samples/LIDAR_TOP, sweeps/LIDAR_TOP and panoptic/{self.version}; "
+            "train and val scenes are in dataset.version=v1.0-trainval (or v1.0-mini), test ones in v1.0-test.\n"
             "Point dataset.root or the environment variable NUSCENES_ROOT at the folder that holds them,\n"
             f"or simulate one: python -m most.simulate simulation=nuscenes out={self.root}"
         )
