@@ -48,3 +48,11 @@ def write_sequence(root: Path, name: str, scans: range, labelled: bool = True, r
     np.savetxt(folder / "times.txt", np.arange(rows) * 0.1, fmt="%.17g")
     (folder / "calib.txt").write_text(f"P0: 1 0 0 0 0 1 0 0 0 0 1 0\nTr: {' '.join(map(str, TR[:3].ravel()))}\n")
     return folder
+
+
+def write_tree(root: Path) -> Path:
+    """Write training 00 (scans 0..3), validation 08 (0..2) and test 11 (0..1, no labels)."""
+    write_sequence(root, "00", range(4))
+    write_sequence(root, "08", range(3))
+    write_sequence(root, "11", range(2), labelled=False)
+    return root

@@ -11,8 +11,7 @@ from most.backbones import AsymmetricUNetSmallSettings
 from most.checks import check_resume, stages_to_run
 from most.config import Config, Heads
 from most.datasets.augment import Augment
-from most.datasets.datamodule import SemanticKITTISettings
-from most.datasets.semantickitti import SemanticKITTI, Splits
+from most.datasets.semantickitti import SemanticKITTI, SemanticKITTISettings, Splits
 from most.errors import ConfigError, DataError
 from most.membership import Nearest, PointSegMLPSettings
 from most.modal.extent import TrackMax

@@ -16,7 +16,8 @@ from omegaconf.errors import OmegaConfBaseException
 
 from most.backbones import AsymmetricUNetSettings, AsymmetricUNetSmallSettings, ResidualUNetSettings
 from most.datasets.augment import Augment
-from most.datasets.datamodule import SemanticKITTISettings
+from most.datasets.nuscenes import NuScenesSettings
+from most.datasets.semantickitti import SemanticKITTISettings
 from most.encoder import PointEncoder
 from most.errors import ConfigError
 from most.heads import CentreHead, SemanticHead
@@ -29,7 +30,7 @@ from most.stages.trainer import TrainerSettings
 from most.voxels import Grid
 
 COMPONENTS: dict[str, dict[str, type]] = {
-    "dataset": {"semantickitti": SemanticKITTISettings},
+    "dataset": {"semantickitti": SemanticKITTISettings, "nuscenes": NuScenesSettings},
     "augment": {"augment": Augment},
     "extent": {"shrink_wrap": ShrinkWrap, "track_max": TrackMax},
     "grid": {"grid": Grid},

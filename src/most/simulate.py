@@ -18,7 +18,7 @@ class SimulateConfig:
     """Everything ``most.simulate`` is told."""
 
     simulation: Any = None
-    out: str = "data/simulated"  # holds sequences/
+    out: str = "data/simulated"  # root of the tree
 
 
 ConfigStore.instance().store(name="simulate_schema", node=SimulateConfig)

@@ -1,7 +1,8 @@
 """The words every stage speaks: Sweep, Instances, Sample, Voxels, BevMaps, Detections, Panoptic.
 
-Frames: *sensor* is the current sweep's lidar frame (x forward, y left, z up, metres); *world* is the frame of a
-sequence's poses; *grid* counts voxels or bird's-eye-view (BEV) cells from the lower corner of the range.
+Frames: *sensor* is the current sweep's lidar frame as its dataset has it, in metres with z up (SemanticKITTI's x points
+forward and y left, nuScenes' x right and y forward); *world* is the frame of a sequence's poses; *grid* counts voxels
+or bird's-eye-view (BEV) cells from the lower corner of the range.
 Class ids are training ids (0 is void) everywhere except in fields named ``labels`` and ``keys``, which hold a
 dataset's own raw labels, widened to int64: they identify an instance, and metrics need them untouched.
 """

@@ -14,7 +14,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from most.checks import stages_to_run
 from most.config import Config, conf_dir, register, typed
-from most.datasets.datamodule import SemanticKITTIDataModule
+from most.datasets.datamodule import SweepDataModule
 from most.entry import run, start
 from most.metrics.report import write_report
 from most.training import build_stage, build_trainer, handed_over
@@ -29,7 +29,7 @@ def train(config: Config, folder: Path) -> None:
     """
     if config.trainer.threads:
         torch.set_num_threads(config.trainer.threads)
-    data = SemanticKITTIDataModule(config.dataset, config.augment, config.extent, config.seed)
+    data = SweepDataModule(config.dataset, config.augment, config.extent, config.seed)
     names = stages_to_run(config, data.reader, folder)
     settings: Any = OmegaConf.to_container(OmegaConf.structured(config))
     try:
@@ -41,7 +41,7 @@ def train(config: Config, folder: Path) -> None:
 
 
 def run_stage(
-    name: str, config: Config, data: SemanticKITTIDataModule, folder: Path, logger: Logger | bool, resume: str | None
+    name: str, config: Config, data: SweepDataModule, folder: Path, logger: Logger | bool, resume: str | None
 ) -> None:
     """Train one stage from its beginning, or from a checkpoint, to its end, and write what it reached."""
     L.seed_everything(config.seed, workers=True)

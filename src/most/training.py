@@ -21,7 +21,7 @@ from most.assembly import (
 )
 from most.config import Config
 from most.datasets.class_counts import class_counts
-from most.datasets.datamodule import SemanticKITTIDataModule
+from most.datasets.datamodule import SweepDataModule
 from most.datasets.reader import Reader
 from most.membership import Nearest, PointSegMLP
 from most.stages.callbacks import Throughput
@@ -41,7 +41,7 @@ def build_stage(name: str, config: Config, data: SemanticKITTIDataModule, stage1
     return build_membership_stage(config, stage1, data.reader)
 
 
-def build_detection(config: Config, data: SemanticKITTIDataModule) -> DetectionStage:
+def build_detection(config: Config, data: SweepDataModule) -> DetectionStage:
     """Make the network and wire it for stage 1, which knows no membership but the nearest centre."""
     taxonomy, parts = data.reader.taxonomy, model_parts(config) | {"membership": Nearest()}
     predictor = build_predictor(build_network(parts, taxonomy), parts, taxonomy)

@@ -3,17 +3,13 @@ from pathlib import Path
 
 import pytest
 
-from semantickitti_tree import write_sequence
+from semantickitti_tree import write_sequence, write_tree
 
 
 @pytest.fixture
 def tree(tmp_path: Path) -> Path:
     """Root of a tree: training 00 (scans 0..3), validation 08 (0..2), test 11 (0..1, no labels)."""
-    root = tmp_path / "semantickitti"
-    write_sequence(root, "00", range(4))
-    write_sequence(root, "08", range(3))
-    write_sequence(root, "11", range(2), labelled=False)
-    return root
+    return write_tree(tmp_path / "semantickitti")
 
 
 @pytest.fixture

@@ -7,10 +7,13 @@ import torch
 from lightning.pytorch.callbacks import Callback
 from omegaconf import OmegaConf
 
+import nuscenes_tree
 from most.datasets.augment import Augment
-from most.datasets.datamodule import SemanticKITTIDataModule, SemanticKITTISettings
+from most.datasets.datamodule import PanopticNuScenesDataModule, SemanticKITTIDataModule
+from most.datasets.nuscenes import NuScenesSettings, SceneSplits
+from most.datasets.reader import Frame
 from most.datasets.sampler import EpochSampler, OrderedSampler
-from most.datasets.semantickitti import Splits
+from most.datasets.semantickitti import SemanticKITTISettings, Splits
 from most.errors import ConfigError, DataError
 from most.modal.extent import ShrinkWrap
 from most.structures import Sample
@@ -19,7 +22,7 @@ from most.structures import Sample
 def module(tree: Path, **options: object) -> SemanticKITTIDataModule:
     splits = Splits(train=["00"], val=["08"], test=["11"])
     chosen = {"workers": 0, "sweeps": 1, "tables": str(tree / "tables")} | options
-    settings = SemanticKITTISettings(str(tree), splits, **chosen)  # type: ignore[arg-type]
+    settings = SemanticKITTISettings(str(tree), splits=splits, **chosen)  # type: ignore[arg-type]
     return SemanticKITTIDataModule(settings, Augment(rotation=45.0), ShrinkWrap(), seed=3)
 
 
@@ -158,3 +161,24 @@ def test_settings_are_a_structured_configuration() -> None:
     assert isinstance(settings, SemanticKITTISettings)
     assert settings.splits.val == ["07"]
     assert settings.splits.train[0] == "00"
+
+
+def test_key_frames_of_nuscenes_come_with_the_sweeps_before_them(tmp_path: Path) -> None:
+    root = nuscenes_tree.write_tree(tmp_path / "nuscenes", {"scene-0001": True, "scene-0003": True})
+    splits = SceneSplits(train=["scene-0001"], val=["scene-0003"])
+    settings = NuScenesSettings(str(root), splits=splits, sweeps=3, workers=0, tables=str(tmp_path / "tables"))
+    data = PanopticNuScenesDataModule(settings, Augment(), ShrinkWrap())
+    data.prepare_data()
+    assert [path.name for path in sorted((tmp_path / "tables").rglob("*.npz"))] == ["scene-0001.npz", "scene-0003.npz"]
+    samples = [sample for batch in data.val_dataloader() for sample in batch]
+    assert [(sample.index, len(sample.points)) for sample in samples] == [(0, 8), (2, 24), (4, 32)]
+    assert all(sample.num_current == 8 for sample in samples)
+    assert len(data.reader.boxes(Frame("scene-0003", 0))) == 1
+    instances = samples[1].instances
+    assert instances is not None
+    assert dict(zip(instances.keys.tolist(), instances.classes.tolist(), strict=True)) == {
+        nuscenes_tree.CAR: 4, nuscenes_tree.CHILD: 7, nuscenes_tree.ADULT: 7
+    }  # fmt: skip
+    assert instances.velocity_known.all()
+    car = instances.keys.tolist().index(nuscenes_tree.CAR)
+    torch.testing.assert_close(instances.velocities[car], torch.tensor([-4.0, 0.0]))  # 1 m in 0.25 s, to the left

@@ -1,29 +1,42 @@
 """What every reader promises (most.datasets.reader), over all readers: a new one joins READERS, and has to pass."""
 
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 import torch
 
+import nuscenes_tree
+import semantickitti_tree
+from most.datasets.nuscenes import PanopticNuScenes, SceneSplits
 from most.datasets.reader import SPLITS, Frame, Reader
 from most.datasets.semantickitti import SemanticKITTI, Splits
 from most.errors import ConfigError, DataError
 
 READERS: dict[str, Callable[[Path], Reader]] = {
     "semantickitti": lambda root: SemanticKITTI(root, Splits(train=["00"], val=["08"], test=["11"])),
+    "nuscenes": lambda root: PanopticNuScenes(
+        root, splits=SceneSplits(train=["scene-0001"], val=["scene-0003"], test=["scene-0077"])
+    ),
+}
+TREES: dict[str, Callable[[Path], Path]] = {  # sequences in all splits, that of test without labels
+    "semantickitti": semantickitti_tree.write_tree,
+    "nuscenes": lambda root: nuscenes_tree.write_tree(
+        root, {"scene-0001": True, "scene-0003": True, "scene-0077": False}
+    ),
 }
 
 
 @pytest.fixture(params=READERS)
-def make_reader(request: pytest.FixtureRequest) -> Callable[[Path], Reader]:
-    return READERS[request.param]
+def dataset(request: pytest.FixtureRequest) -> str:
+    return request.param
 
 
 @pytest.fixture
-def reader(make_reader: Callable[[Path], Reader], tree: Path) -> Reader:
-    """A reader over a tiny tree with sequences in all splits, that of test without labels."""
-    return make_reader(tree)
+def reader(dataset: str, tmp_path: Path) -> Reader:
+    """A reader over a tiny tree."""
+    return READERS[dataset](TREES[dataset](tmp_path / "tree"))
 
 
 @pytest.fixture
@@ -35,7 +48,22 @@ def frame(reader: Reader) -> Frame:
 def test_splits_list_their_frames_in_order(reader: Reader, split: str) -> None:
     frames = reader.frames(split)
     assert frames == sorted(set(frames))
-    assert frames == [frame for sequence in reader.sequences(split) for frame in reader.frames_of(sequence)]
+    assert frames == [frame for sequence in reader.sequences(split) for frame in reader.key_frames(sequence)]
+
+
+def test_key_frames_are_frames(reader: Reader, frame: Frame) -> None:
+    frames = reader.frames_of(frame.sequence)
+    assert frames == sorted(set(frames))
+    assert set(reader.key_frames(frame.sequence)) <= set(frames)
+
+
+def test_labelled_frames_have_labels(reader: Reader) -> None:
+    assert reader.labelled_frames("val") == reader.frames("val")
+
+
+def test_velocities_are_told_by_neighbouring_key_frames(reader: Reader, frame: Frame) -> None:
+    times = [reader.sweep(other).time for other in reader.key_frames(frame.sequence)]
+    assert max(late - early for early, late in pairwise(times)) <= reader.max_gap
 
 
 def test_splits_share_no_sequence(reader: Reader) -> None:
@@ -88,7 +116,7 @@ def test_test_split_has_no_labels(reader: Reader) -> None:
 
 def test_sources_are_there(reader: Reader, frame: Frame) -> None:
     large, small = reader.sources(frame.sequence)
-    assert len(large) >= 2 * len(reader.frames_of(frame.sequence))
+    assert len(large) >= 2 * len(reader.key_frames(frame.sequence))
     assert all(path.is_file() for path in [*large, *small])
 
 
@@ -99,8 +127,8 @@ def test_predictions_have_places_of_their_own(reader: Reader, tmp_path: Path) ->
     assert all(place.is_relative_to(tmp_path) for place in places)
 
 
-def test_missing_tree_says_what_to_do(make_reader: Callable[[Path], Reader], tmp_path: Path) -> None:
+def test_missing_tree_says_what_to_do(dataset: str, tmp_path: Path) -> None:
     with pytest.raises(DataError) as error:
-        make_reader(tmp_path / "nowhere").frames("val")
+        READERS[dataset](tmp_path / "nowhere").frames("val")
     for part in (str(tmp_path / "nowhere"), "expected", "found none", "most.simulate", "_ROOT"):
         assert part in str(error.value)

@@ -11,7 +11,7 @@ from most.simulation.scene import Scene
 from most.simulation.street import Street
 from most.simulation.surfaces import Surface
 from most.simulation.vehicles import bus, car, truck, van
-from most.simulation.world import PERIOD, World
+from most.simulation.world import World
 
 NOISE = 0.01
 UP = np.array([0.0, 0.0, 5.0])
@@ -62,13 +62,15 @@ def test_instance_ids_are_stable_and_belong_to_things_alone(drive):
 
 
 def test_what_stands_keeps_its_box_and_what_moves_has_the_velocity_it_says(drive):
-    _, _, truth = drive
+    world, _, truth = drive
     moving = np.isin(truth.label, [252, 253, 254, 258])
     assert moving.any()
     assert not moving.all()
     for instance in np.unique(truth.instance):
         rows = np.flatnonzero(truth.instance == instance)
-        steps = np.diff(truth.centre[rows], axis=0)[:, :2] / (np.diff(truth.scan[rows]) * PERIOD)[:, None]
+        steps = (
+            np.diff(truth.centre[rows], axis=0)[:, :2] / (np.diff(truth.scan[rows]) * world.settings.period)[:, None]
+        )
         if moving[rows[0]]:
             means = 0.5 * (truth.velocity[rows][1:] + truth.velocity[rows][:-1])
             assert steps == pytest.approx(means, abs=0.1)
@@ -90,7 +92,7 @@ def test_road_of_every_scan_lies_on_the_same_land(drive):
 def test_the_sensor_drives_forward_on_the_right_hand_side(drive):
     world, scans, _ = drive
     way = scans[1].pose[:3, 3] - scans[0].pose[:3, 3]
-    assert np.linalg.norm(way[:2]) == pytest.approx(world.speed * PERIOD, rel=0.1)
+    assert np.linalg.norm(way[:2]) == pytest.approx(world.speed * world.settings.period, rel=0.1)
     assert scans[0].pose[:3, 0] @ way / np.linalg.norm(way) > 0.99
     assert scans[0].pose[1, 3] < 0
     assert np.linalg.det(scans[0].pose[:3, :3]) == pytest.approx(1)

@@ -1,7 +1,6 @@
-"""Lightning's view of SemanticKITTI trees, real or simulated: a loader a split, batches of ``list[Sample]``."""
+"""Lightning's view of the datasets: a loader a split, batches of ``list[Sample]``."""
 
 import signal
-from dataclasses import dataclass, field
 
 import lightning as L
 from torch.utils.data import DataLoader
@@ -9,29 +8,13 @@ from torch.utils.data import DataLoader
 from most.datasets.augment import Augment
 from most.datasets.dataset import WindowDataset
 from most.datasets.instances import InstanceTables
+from most.datasets.nuscenes import PanopticNuScenes
+from most.datasets.reader import Reader
 from most.datasets.sampler import EpochSampler, OrderedSampler
-from most.datasets.semantickitti import SemanticKITTI, Splits
-from most.errors import ConfigError
+from most.datasets.semantickitti import SemanticKITTI
+from most.datasets.settings import DatasetSettings
 from most.modal.instances import ExtentStrategy
 from most.structures import Sample
-
-
-@dataclass
-class SemanticKITTISettings:
-    """Where the tree is, which sequences to use, and how to load them."""
-
-    root: str = "data/semantickitti"  # holds sequences/
-    splits: Splits = field(default_factory=Splits)
-    sweeps: int = 10  # previous sweeps beside the current one
-    batch_size: int = 1
-    workers: int = 2  # processes that load; 0 loads in the main process
-    cache: bool = False  # keep sweeps in memory, in each worker; for datasets of a few hundred sweeps
-    tables: str = "data/tables"  # where tables of modal instances are kept
-
-    def __post_init__(self) -> None:
-        for key, lowest in {"sweeps": 0, "batch_size": 1, "workers": 0}.items():
-            if getattr(self, key) < lowest:
-                raise ConfigError(f"dataset.{key}: expected at least {lowest}, found {getattr(self, key)}")
 
 
 def standing(trainer: L.Trainer) -> tuple[int, int]:
@@ -45,22 +28,22 @@ def standing(trainer: L.Trainer) -> tuple[int, int]:
     return epochs.processed, batches.current.processed  # type: ignore[attr-defined]  # of the tracker it is at run time
 
 
-class SemanticKITTIDataModule(L.LightningDataModule):
-    """Windows of sweeps with modal instances; only training is augmented and shuffled.
+class SweepDataModule(L.LightningDataModule):
+    """Windows of any dataset's sweeps with modal instances; only training is augmented and shuffled.
 
     A trainer over several processes needs ``use_distributed_sampler=False``: the sampler here shares samples out.
     """
 
-    def __init__(
-        self, settings: SemanticKITTISettings, augment: Augment, extent: ExtentStrategy, seed: int = 0
-    ) -> None:
+    reader: Reader
+
+    def __init__(self, settings: DatasetSettings, augment: Augment, extent: ExtentStrategy, seed: int = 0) -> None:
         """``extent`` says how large instances are; ``seed`` fixes order and augmentation."""
         super().__init__()
         self.settings = settings
         self.augment = augment
         self.seed = seed
         self.training_batch = settings.batch_size  # samples; a stage whose steps take several batches joins them
-        self.reader = SemanticKITTI(settings.root, settings.splits)
+        self.reader = settings.reader()
         self.instances = InstanceTables(self.reader, extent, settings.tables)
 
     def prepare_data(self) -> None:
@@ -111,6 +94,18 @@ class SemanticKITTIDataModule(L.LightningDataModule):
             collate_fn=list,
             worker_init_fn=_leave_interrupts_to_the_main_process,
         )
+
+
+class SemanticKITTIDataModule(SweepDataModule):
+    """Every scan of SemanticKITTI, real or simulated, with those before it."""
+
+    reader: SemanticKITTI
+
+
+class PanopticNuScenesDataModule(SweepDataModule):
+    """The key frames of Panoptic nuScenes, real or simulated, each with the sweeps before it."""
+
+    reader: PanopticNuScenes
 
 
 def _leave_interrupts_to_the_main_process(_: int) -> None:

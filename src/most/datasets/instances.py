@@ -32,9 +32,9 @@ class InstanceTables:
         return self.tables[sequence]
 
     def _load_or_build(self, sequence: str) -> InstanceTable:
-        frames, taxonomy = self.reader.frames_of(sequence), self.reader.taxonomy
+        frames, taxonomy = self.reader.key_frames(sequence), self.reader.taxonomy
         made_from = fingerprint(*self.reader.sources(sequence), asdict(taxonomy))
-        rules = LabelRules(taxonomy.to_training, taxonomy.is_thing, taxonomy.instance_of)
+        rules = LabelRules(taxonomy.to_training, taxonomy.is_thing, taxonomy.instance_of, self.reader.max_gap)
         path = self.folder / self._tree() / f"{sequence}.npz"
         return cached_table(path, made_from, map(self.reader.sweep, frames), len(frames), rules)
 

@@ -23,11 +23,6 @@ class Frame:
     sequence: str
     index: int
 
-    @property
-    def name(self) -> str:
-        """The stem of the sweep's files."""
-        return f"{self.index:06d}"
-
 
 @runtime_checkable
 class Reader(Protocol):
@@ -35,21 +30,30 @@ class Reader(Protocol):
 
     root: Path
     taxonomy: Taxonomy
+    max_gap: float  # s between two key frames of a track that still tell its velocity
 
     def sequences(self, split: str) -> list[str]:
         """The split's sequences that are on disk."""
         ...
 
     def frames(self, split: str) -> list[Frame]:
-        """All sweeps of a split, by sequence and number."""
+        """The key frames of a split, by sequence and number: what is trained on, predicted and scored."""
+        ...
+
+    def labelled_frames(self, split: str) -> list[Frame]:
+        """The key frames of a split whose labels are there; for scoring, which needs no scans."""
+        ...
+
+    def key_frames(self, sequence: str) -> list[Frame]:
+        """The sweeps of one sequence that the dataset annotates, by number."""
         ...
 
     def frames_of(self, sequence: str) -> list[Frame]:
-        """All sweeps of one sequence, by number."""
+        """All sweeps of one sequence, by number: the key frames and, where a dataset has any, those between them."""
         ...
 
     def has_labels(self, sequence: str) -> bool:
-        """Whether the sequence is annotated; those of a test split usually are not."""
+        """Whether the sequence's key frames are annotated; those of a test split usually are not."""
         ...
 
     def sweep(self, frame: Frame) -> Sweep:
@@ -65,7 +69,7 @@ class Reader(Protocol):
         ...
 
     def sources(self, sequence: str) -> tuple[list[Path], list[Path]]:
-        """Files that the sequence's labelled sweeps are made of: large ones, and small ones."""
+        """Files that the sequence's labelled sweeps are made of: large ones, and small ones of this sequence alone."""
         ...
 
     def prediction_path(self, folder: Path, frame: Frame) -> Path:

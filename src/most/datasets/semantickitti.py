@@ -4,7 +4,6 @@ Poses and times cover the whole drive: more rows than scans are normal. A test s
 """
 
 import re
-import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,6 +13,8 @@ from torch import Tensor
 from most.datasets.kitti_files import read_poses, read_rows, read_scan
 from most.datasets.labels import read_labels
 from most.datasets.reader import SPLITS, Frame
+from most.datasets.settings import DatasetSettings
+from most.datasets.splits import check_split, present_sequences
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError, DataError
 from most.structures import Sweep
@@ -38,8 +39,22 @@ class Splits:
                 )
 
 
+@dataclass
+class SemanticKITTISettings(DatasetSettings):
+    """A SemanticKITTI tree, real or simulated, and which of its sequences to use."""
+
+    root: str = "data/semantickitti"  # holds sequences/
+    splits: Splits = field(default_factory=Splits)
+
+    def reader(self) -> "SemanticKITTI":
+        """Make the reader of the tree; nothing is read yet."""
+        return SemanticKITTI(self.root, self.splits)
+
+
 class SemanticKITTI:
     """Reads a SemanticKITTI tree; :class:`most.datasets.reader.Reader` says what each method promises."""
+
+    max_gap = 0.35  # s; scans are 0.1 s apart
 
     def __init__(self, root: str | Path, splits: Splits | None = None) -> None:
         self.root = Path(root).expanduser()
@@ -54,14 +69,11 @@ class SemanticKITTI:
 
     def sequences(self, split: str) -> list[str]:
         """The split's sequences that are on disk: warns about missing ones, raises a DataError when all are."""
-        if split not in SPLITS:
-            raise ConfigError(f"split: expected one of {', '.join(SPLITS)}, found {split!r}")
+        check_split(split)
         wanted = getattr(self.splits, split)
-        present = [name for name in wanted if self.folder(name).is_dir()]
+        present = present_sequences(self.root, split, wanted, lambda name: self.folder(name).is_dir())
         if not present:
             raise DataError(self._explain_missing(split, wanted))
-        if missing := [name for name in wanted if name not in present]:
-            warnings.warn(f"{self.root}: {split}: sequences {', '.join(missing)} are not there", stacklevel=1)
         for name in present:
             if split != "test" and not self.has_labels(name):
                 raise DataError(
@@ -72,11 +84,15 @@ class SemanticKITTI:
 
     def frames(self, split: str) -> list[Frame]:
         """All scans of a split."""
-        return [frame for sequence in self.sequences(split) for frame in self.frames_of(sequence)]
+        return [frame for sequence in self.sequences(split) for frame in self.key_frames(sequence)]
 
     def labelled_frames(self, split: str) -> list[Frame]:
         """All frames of a split that have a label file; for scoring, which needs no scans."""
         return [frame for name in self.sequences(split) for frame in self._list(name, "labels", "label")]
+
+    def key_frames(self, sequence: str) -> list[Frame]:
+        """All scans of a sequence: each of them is annotated."""
+        return self.frames_of(sequence)
 
     def frames_of(self, sequence: str) -> list[Frame]:
         """All scans of a sequence, by number."""
@@ -88,7 +104,7 @@ class SemanticKITTI:
 
     def sweep(self, frame: Frame) -> Sweep:
         """Read a scan with its pose, time and labels; non-finite points stay, since every point needs a label."""
-        points = read_scan(self.folder(frame.sequence) / "velodyne" / f"{frame.name}.bin")
+        points = read_scan(self.folder(frame.sequence) / "velodyne" / f"{_stem(frame)}.bin")
         labels = self.labels(frame) if self.has_labels(frame.sequence) else None
         if labels is not None and len(labels) != len(points):
             raise DataError(
@@ -121,7 +137,7 @@ class SemanticKITTI:
     def sources(self, sequence: str) -> tuple[list[Path], list[Path]]:
         """The scans and label files of a sequence, and its poses, calibration and times."""
         folder, frames = self.folder(sequence), self.frames_of(sequence)
-        scans = [folder / "velodyne" / f"{frame.name}.bin" for frame in frames]
+        scans = [folder / "velodyne" / f"{_stem(frame)}.bin" for frame in frames]
         labels = [self._label_path(frame) for frame in frames]
         texts = [folder / name for name in ("poses.txt", "calib.txt", "times.txt")]
         for path in labels + texts:
@@ -131,10 +147,10 @@ class SemanticKITTI:
 
     def prediction_path(self, folder: str | Path, frame: Frame) -> Path:
         """Where a submission keeps its labels of a frame."""
-        return Path(folder) / "sequences" / frame.sequence / "predictions" / f"{frame.name}.label"
+        return Path(folder) / "sequences" / frame.sequence / "predictions" / f"{_stem(frame)}.label"
 
     def _label_path(self, frame: Frame) -> Path:
-        return self.folder(frame.sequence) / "labels" / f"{frame.name}.label"
+        return self.folder(frame.sequence) / "labels" / f"{_stem(frame)}.label"
 
     def _list(self, sequence: str, kind: str, suffix: str) -> list[Frame]:
         folder = self.folder(sequence) / kind
@@ -149,8 +165,8 @@ class SemanticKITTI:
     def _row(self, table: Tensor, frame: Frame, file: str) -> Tensor:
         if frame.index >= len(table):
             raise DataError(
-                f"{self.folder(frame.sequence) / file}: expected a row for scan {frame.name}, found {len(table)} rows; "
-                "a row belongs to each scan from 000000 on: copy the whole file"
+                f"{self.folder(frame.sequence) / file}: expected a row for scan {_stem(frame)}, found {len(table)} "
+                "rows; a row belongs to each scan from 000000 on: copy the whole file"
             )
         return table[frame.index]
 
@@ -163,3 +179,8 @@ class SemanticKITTI:
             "Point dataset.root or the environment variable SEMANTICKITTI_ROOT at the folder that holds sequences/,\n"
             f"or simulate one: python -m most.simulate out={self.root}"
         )
+
+
+def _stem(frame: Frame) -> str:
+    """The name of a frame's files, without what follows the dot."""
+    return f"{frame.index:06d}"

@@ -1,7 +1,7 @@
 """What a dataset's labels mean: its classes, which of them are things, their colours, and raw <-> training ids.
 
-A taxonomy is data: one YAML file beside this module, read by :meth:`Taxonomy.load`. A raw label is 32 bits wide: the
-lower 16 hold the dataset's own class id, the upper 16 the instance's number.
+A taxonomy is data: one YAML file beside this module, read by :meth:`Taxonomy.load`. A raw label is one number that
+holds the dataset's own class id and the instance's number, as the taxonomy's :class:`LabelCode` says.
 """
 
 from dataclasses import dataclass
@@ -17,8 +17,37 @@ from torch import Tensor
 from most.errors import ConfigError, DataError
 
 TAXONOMIES = Path(__file__).parent / "taxonomies"
-CLASS_BITS = 16
 KINDS = ("void", "thing", "stuff")
+ENTRIES = {
+    "name": str,
+    "min_points": int,
+    "raw_table_size": int,
+    "label": dict,
+    "predicted_as": str,
+    "classes": list,
+}
+CHOICES = {"label.high": ("class", "instance"), "predicted_as": ("raw", "training")}
+
+
+@dataclass(frozen=True)
+class LabelCode:
+    """How one number holds a class id and an instance's number: ``high * step + low``."""
+
+    high: str  # "class" or "instance": which of the two is multiplied
+    step: int  # instance numbers are smaller; class ids too, where they are the low part
+
+    def class_of(self, label: Int64[Tensor, "*points"]) -> Int64[Tensor, "*points"]:
+        """The class id in a label."""
+        return label // self.step if self.high == "class" else label % self.step
+
+    def instance_of(self, label: Int64[Tensor, "*points"]) -> Int64[Tensor, "*points"]:
+        """The instance's number in a label."""
+        return label % self.step if self.high == "class" else label // self.step
+
+    def join(self, classes: Int64[Tensor, "*points"], instances: Int64[Tensor, "*points"]) -> Int64[Tensor, "*points"]:
+        """The label of a class id and an instance's number."""
+        high, low = (classes, instances) if self.high == "class" else (instances, classes)
+        return high * self.step + low
 
 
 @dataclass(frozen=True)
@@ -31,8 +60,10 @@ class Taxonomy:
     stuff: list[int]
     colours: list[list[int]]  # RGB, 0 to 255
     min_points: int  # unmatched segments smaller than this are not counted by the official panoptic quality
-    raw_ids: list[list[int]]  # the raw class ids of each class; predictions are written as the first
+    raw_ids: list[list[int]]  # the raw class ids of each class
     raw_table_size: int  # raw class ids from here on are errors; unlisted ones below are void
+    label: LabelCode
+    predicted_as: str  # which id a submission holds: "raw", the first of the class's raw ids, or "training"
 
     @staticmethod
     def load(name: str) -> "Taxonomy":
@@ -58,6 +89,8 @@ class Taxonomy:
             min_points=content["min_points"],
             raw_ids=[entry["raw"] for entry in classes],
             raw_table_size=content["raw_table_size"],
+            label=LabelCode(content["label"]["high"], content["label"]["step"]),
+            predicted_as=content["predicted_as"],
         )
 
     @property
@@ -67,29 +100,29 @@ class Taxonomy:
 
     def to_training(self, raw: Int64[Tensor, "*points"], source: object = "labels") -> Int64[Tensor, "*points"]:
         """Training ids of raw labels; ``source`` is what a DataError calls them when an id lies outside the table."""
-        classes = raw & ((1 << CLASS_BITS) - 1)
-        if classes.numel() and int(classes.max()) >= self.raw_table_size:
-            raise DataError(
-                f"{source}: expected raw class ids 0..{self.raw_table_size - 1} of {self.name}, "
-                f"found {int(classes.max())}; check that these are labels of this dataset"
-            )
+        classes = self.label.class_of(raw)
+        self._check(classes, self.raw_table_size, "raw", source)
         return self._training_ids.to(raw.device)[classes]
 
-    def to_raw(self, semantics: Int64[Tensor, "*points"]) -> Int64[Tensor, "*points"]:
-        """The raw class id that predictions of each class are written as."""
-        return self._written_ids.to(semantics.device)[semantics]
-
     def encode(self, semantics: Int64[Tensor, "*points"], ids: Int64[Tensor, "*points"]) -> Int64[Tensor, "*points"]:
-        """Raw labels of classes and instance numbers (0 for stuff); numbers must fit the format's 16 bits."""
-        if ids.numel() and not 0 <= int(ids.min()) <= int(ids.max()) < 1 << CLASS_BITS:
+        """Labels of a submission from classes and instance numbers (0 for stuff), which must fit the format."""
+        if ids.numel() and not 0 <= int(ids.min()) <= int(ids.max()) < self.label.step:
             raise DataError(
-                f"instance ids: expected 0..{(1 << CLASS_BITS) - 1}, found {int(ids.min())}..{int(ids.max())}"
+                f"instance ids: expected 0..{self.label.step - 1}, found {int(ids.min())}..{int(ids.max())}"
             )
-        return self.to_raw(semantics) | (ids << CLASS_BITS)
+        return self.label.join(self._written_ids.to(semantics.device)[semantics], ids)
+
+    def decode(self, labels: Int64[Tensor, "*points"], source: object = "labels") -> Int64[Tensor, "*points"]:
+        """Training ids of a submission's labels, whoever wrote it; a DataError names ``source``."""
+        if self.predicted_as == "raw":
+            return self.to_training(labels, source)
+        classes = self.label.class_of(labels)
+        self._check(classes, self.num_classes, "predicted", source)
+        return classes
 
     def instance_of(self, raw: Int64[Tensor, "*points"]) -> Int64[Tensor, "*points"]:
-        """The instance's number in a raw label; 0 means that the point belongs to no instance."""
-        return raw >> CLASS_BITS
+        """The instance's number in a label; 0 means that the point belongs to no instance."""
+        return self.label.instance_of(raw)
 
     def is_thing(self, semantics: Int64[Tensor, "*points"]) -> Bool[Tensor, "*points"]:
         """Whether each training id is a thing."""
@@ -104,7 +137,8 @@ class Taxonomy:
 
     @cached_property
     def _written_ids(self) -> Int64[Tensor, "classes"]:
-        return torch.tensor([raw_ids[0] for raw_ids in self.raw_ids])
+        first = [raw_ids[0] for raw_ids in self.raw_ids]
+        return torch.tensor(first if self.predicted_as == "raw" else range(self.num_classes))
 
     @cached_property
     def _thing_mask(self) -> Bool[Tensor, "classes"]:
@@ -112,14 +146,27 @@ class Taxonomy:
         mask[self.things] = True
         return mask
 
+    def _check(self, classes: Int64[Tensor, "*points"], end: int, kind: str, source: object) -> None:
+        if classes.numel() and int(classes.max()) >= end:
+            raise DataError(
+                f"{source}: expected {kind} class ids 0..{end - 1} of {self.name}, found {int(classes.max())}; "
+                "check that these are labels of this dataset"
+            )
+
 
 def check_content(path: Path, content: Any) -> None:
     """Raise a DataError for the first entry of a taxonomy file that is missing or makes no sense."""
     if not isinstance(content, dict):
         raise DataError(f"{path}: expected a mapping, found {type(content).__name__}")
-    for key, kind in {"name": str, "min_points": int, "raw_table_size": int, "classes": list}.items():
+    for key, kind in ENTRIES.items():
         if not isinstance(content.get(key), kind):
             raise DataError(f"{path}: {key}: expected {kind.__name__}, found {content.get(key)!r}")
+    found = {"label.high": content["label"].get("high"), "predicted_as": content["predicted_as"]}
+    for key, choices in CHOICES.items():
+        if found[key] not in choices:
+            raise DataError(f"{path}: {key}: expected {' or '.join(choices)}, found {found[key]!r}")
+    if not is_integers([step := content["label"].get("step")], 1 << 31) or step < 2:
+        raise DataError(f"{path}: label.step: expected a number above 1, found {step!r}")
     taken: dict[int, str] = {}
     for index, entry in enumerate(content["classes"]):
         check_class(f"{path}: classes[{index}]", index, entry, content["raw_table_size"])

@@ -11,6 +11,21 @@ def _expect(key: str, holds: bool, expected: str, found: object) -> None:
         raise ConfigError(f"simulation.{key}: expected {expected}, found {found!r}")
 
 
+@dataclass(frozen=True)
+class Layout:
+    """What a dataset's own tree asks of a simulation."""
+
+    period: float  # s between scans
+    name: str  # pattern of a sequence's name
+    names: str  # the same in words
+
+
+LAYOUTS = {
+    "semantickitti": Layout(0.1, "[0-9]{2}", 'names of two digits, quoted in YAML ("07")'),
+    "nuscenes": Layout(0.05, "scene-[0-9]{4}", "names such as scene-0061"),
+}
+
+
 @dataclass
 class SensorSettings:
     """A spinning lidar: fans of evenly spaced beams, and what it gets wrong. The default is KITTI's 64-beam sensor."""
@@ -61,7 +76,7 @@ class TrafficSettings:
 
 @dataclass
 class SimulationSettings:
-    """Which sequences to make, of which street, seen by which sensor; a scan is 0.1 s after the one before."""
+    """Which sequences to make, of which street, seen by which sensor, and written in which layout."""
 
     sequences: list[str] = field(default_factory=lambda: ["00", "01", "02", "08"])
     scans: int = 10  # of each sequence
@@ -69,12 +84,20 @@ class SimulationSettings:
     speed: float = 8.0  # of the sensor, m/s; each sequence drives at 0.6 to 1.4 times that
     sensor: SensorSettings = field(default_factory=SensorSettings)
     traffic: TrafficSettings = field(default_factory=TrafficSettings)
+    layout: str = "semantickitti"  # or nuscenes; it sets the time between scans, too
 
     def __post_init__(self) -> None:
-        named = all(isinstance(name, str) and re.fullmatch(r"[0-9]{2}", name) for name in self.sequences)
-        _expect("sequences", named, 'names of two digits, quoted in YAML ("07")', self.sequences)
+        _expect("layout", self.layout in LAYOUTS, f"one of {', '.join(LAYOUTS)}", self.layout)
+        layout = LAYOUTS[self.layout]
+        named = all(isinstance(name, str) and re.fullmatch(layout.name, name) for name in self.sequences)
+        _expect("sequences", named, f"{layout.names} in the layout {self.layout}", self.sequences)
         unique = len(set(self.sequences)) == len(self.sequences) > 0
         _expect("sequences", unique, "each name once, at least one", self.sequences)
         _expect("scans", 1 <= self.scans <= 10_000, "a number in [1, 10000]", self.scans)
         _expect("seed", self.seed >= 0, "0 or more", self.seed)
         _expect("speed", 0 <= self.speed <= 40, "m/s in [0, 40]", self.speed)
+
+    @property
+    def period(self) -> float:
+        """Time between scans, s."""
+        return LAYOUTS[self.layout].period

@@ -16,8 +16,6 @@ from most.simulation.sensor import directions, measure
 from most.simulation.settings import SimulationSettings
 from most.simulation.street import Street
 
-PERIOD = 0.1  # s between scans
-
 
 @dataclass
 class Scan:
@@ -33,10 +31,10 @@ class World:
     """Everything of one sequence, drawn from (seed, sequence) alone; instance k + 1 is ``actors[k]``."""
 
     def __init__(self, settings: SimulationSettings, sequence: str) -> None:
-        self.settings, self.key = settings, (settings.seed, int(sequence))
+        self.settings, self.key = settings, (settings.seed, int(sequence.removeprefix("scene-")))
         rng = np.random.default_rng([*self.key, 0])
         self.speed = settings.speed * float(rng.uniform(0.6, 1.4))
-        drive = self.speed * PERIOD * settings.scans
+        drive = self.speed * settings.period * settings.scans
         self.street = Street(drive, settings.sensor.max_range, rng)
         self.actors = populate(self.street, settings.traffic, self.speed, rng)
         rare = settings.traffic.rare
@@ -93,7 +91,7 @@ class World:
     def scan(self, index: int) -> Scan:
         """Scan ``index``; its noise comes from (seed, sequence, index) alone."""
         rng = np.random.default_rng([*self.key, 1, index])
-        time, sensor = index * PERIOD, self.settings.sensor
+        time, sensor = index * self.settings.period, self.settings.sensor
         pose, rays = self.pose(time), directions(sensor, rng.random())
         points, labels = measure(self.cast(pose, rays, time), rays, sensor, rng)
         return Scan(points, labels, pose, time)
