@@ -10,7 +10,7 @@ from torchmetrics import Metric
 
 from most.metrics.tables import sum_rows
 
-LOOSE_ROWS = 4096  # added since the last summing up; with more, and more than there were then, it is due
+LOOSE_PARTS = 64  # scans whose rows may wait to be summed up
 
 
 class TableMetric(Metric):
@@ -32,10 +32,10 @@ class TableMetric(Metric):
         """Add counts to a table."""
         if not len(rows):
             return
-        parts = [*getattr(self, name), torch.from_numpy(rows).to(self.device)]
-        if sum(len(part) for part in parts[1:]) > max(LOOSE_ROWS, len(parts[0])):
-            parts = [torch.from_numpy(self._summed(name, parts)).to(self.device)]
-        setattr(self, name, parts)
+        parts = getattr(self, name)
+        parts.append(torch.from_numpy(rows).to(self.device))
+        if len(parts) > LOOSE_PARTS:
+            parts[:] = [torch.from_numpy(self._summed(name, parts)).to(self.device)]
 
     def rows(self, name: str) -> Int64[np.ndarray, "rows columns"]:
         """What a table holds, a row a key, ascending."""

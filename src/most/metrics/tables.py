@@ -31,4 +31,8 @@ def find_rows(
 
 def table(*columns: Integers | int) -> Int64[np.ndarray, "rows columns"]:
     """Columns side by side; a number fills its column. At least one column is an array."""
-    return np.stack(np.broadcast_arrays(*columns), axis=1).astype(np.int64)
+    count = next(len(column) for column in columns if not isinstance(column, int))
+    rows = np.empty((count, len(columns)), dtype=np.int64)
+    for index, column in enumerate(columns):
+        rows[:, index] = column
+    return rows

@@ -5,15 +5,14 @@ instance kept its predicted key from one scan to the next. TQ matches instances 
 follows every instance as a track over the whole sequence.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Float64, Int64
 from torch import Tensor
 
-from most.metrics.overlaps import Overlaps, matches_above_half
+from most.metrics.overlaps import Overlaps, among, matches_above_half
 from most.metrics.panoptic import PanopticStatistics, panoptic_statistics_of, true_positives
 from most.metrics.tables import table
 
@@ -80,7 +79,7 @@ def tracking_statistics(
 def _thing_matches(known: Overlaps, rules: TrackingRules) -> dict[Track, tuple[int, float]]:
     """The true positives of things: predicted key and IoU."""
     match = true_positives(known)
-    match = match.where(_of(known.truth.classes[match.truth], rules.things))
+    match = match.where(among(known.truth.classes[match.truth], rules.things))
     classes, keys = known.truth.classes[match.truth].tolist(), known.truth.keys[match.truth].tolist()
     found = zip(known.pred.keys[match.pred].tolist(), match.iou.tolist(), strict=True)
     return dict(zip(zip(classes, keys, strict=True), found, strict=True))
@@ -104,7 +103,7 @@ def _labels(regardless: Overlaps, rules: TrackingRules) -> dict[Track, int]:
     match = matches_above_half(regardless)
     label_of = np.full(len(regardless.truth.keys), UNMATCHED)
     label_of[match.truth] = regardless.pred.keys[match.pred]
-    followed = _of(regardless.truth.classes, rules.things) & (regardless.truth_areas > rules.min_points)
+    followed = among(regardless.truth.classes, rules.things) & (regardless.truth_areas > rules.min_points)
     classes, keys = regardless.truth.classes[followed].tolist(), regardless.truth.keys[followed].tolist()
     return dict(zip(zip(classes, keys, strict=True), label_of[followed].tolist(), strict=True))
 
@@ -119,9 +118,6 @@ def _prediction_rows(
 ) -> Int64[np.ndarray, "predictions 4"]:
     keys = regardless.pred.keys
     enough = regardless.pred_areas > rules.min_points
-    counts = enough | np.isin(keys, [label for label in labels.values() if label != UNMATCHED])
+    matched = set(labels.values()) - {UNMATCHED}
+    counts = enough | np.array([key in matched for key in keys.tolist()], dtype=bool)
     return table(sequence, keys[counts], enough[counts].astype(np.int64), 1)
-
-
-def _of(classes: Int64[np.ndarray, "segments"], chosen: Sequence[int]) -> Bool[np.ndarray, "segments"]:
-    return np.isin(classes, chosen)

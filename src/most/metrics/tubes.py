@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Int64
 from torch import Tensor
 
-from most.metrics.overlaps import Overlaps, totals
+from most.metrics.overlaps import Overlaps, among, totals
 from most.metrics.panoptic import confusion_of
 from most.metrics.renumber import Integers, renumber
 from most.metrics.tables import table
@@ -60,12 +60,12 @@ def tube_statistics(overlaps: Overlaps, sequence: int, rules: TubeRules, num_cla
     """
     known = overlaps.known()
     truth = known.truth
-    tubes = _among(truth.classes, rules.truth_classes) & _is_instance(truth.keys, rules)
+    tubes = among(truth.classes, rules.truth_classes) & _is_instance(truth.keys, rules)
     tubes &= known.truth_areas > rules.min_points
 
     ids, id_of_segment = renumber(known.pred.keys)
     id_of = id_of_segment[known.pred_of]
-    counted = np.where(_among(known.pred.classes, rules.pred_classes)[known.pred_of], known.points, 0)
+    counted = np.where(among(known.pred.classes, rules.pred_classes)[known.pred_of], known.points, 0)
     sizes = totals(id_of, counted, len(ids))
     seen = _is_instance(ids, rules) & (sizes > rules.pred_min_points)
 
@@ -78,10 +78,6 @@ def tube_statistics(overlaps: Overlaps, sequence: int, rules: TubeRules, num_cla
         pred=table(sequence, ids[seen], sizes[seen]),
         overlaps=table(sequence, truth.classes[truth_of], truth.keys[truth_of], ids[id_of], points, of_size),
     )
-
-
-def _among(classes: Integers, chosen: Sequence[int]) -> Bool[np.ndarray, "segments"]:
-    return np.isin(classes, chosen)
 
 
 def _is_instance(ids: Integers, rules: TubeRules) -> Bool[np.ndarray, "segments"]:
