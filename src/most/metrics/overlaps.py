@@ -5,6 +5,7 @@ A scan has some hundred such pairs, and every panoptic and tracking figure is ar
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -16,44 +17,10 @@ from most.metrics.renumber import Integers, renumber
 
 @dataclass
 class Segments:
-    """The distinct (class, key) pairs of one labelling of a scan; class 0 is void."""
+    """The distinct (class, key) pairs of one labelling of a scan, ascending by key; class 0 is void."""
 
     classes: Int64[np.ndarray, "segments"]
     keys: Int64[np.ndarray, "segments"]
-
-
-@dataclass
-class Overlaps:
-    """The pairs of a predicted and a true segment that share points; ``points`` says how many."""
-
-    pred: Segments
-    truth: Segments
-    pred_of: Int64[np.ndarray, "pairs"]  # index of the pair's predicted segment
-    truth_of: Int64[np.ndarray, "pairs"]
-    points: Int64[np.ndarray, "pairs"]
-
-    @property
-    def pred_areas(self) -> Int64[np.ndarray, "segments"]:
-        """Points of each predicted segment; 0 for one that lost all its pairs."""
-        return totals(self.pred_of, self.points, len(self.pred.keys))
-
-    @property
-    def truth_areas(self) -> Int64[np.ndarray, "segments"]:
-        """Points of each true segment."""
-        return totals(self.truth_of, self.points, len(self.truth.keys))
-
-    def known(self) -> "Overlaps":
-        """Without the points whose truth is void, for which no evaluator gives credit or blame."""
-        known = self.truth.classes[self.truth_of] != 0
-        return Overlaps(self.pred, self.truth, self.pred_of[known], self.truth_of[known], self.points[known])
-
-    def by_predicted_key(self) -> "Overlaps":
-        """Predicted segments told apart by their keys alone; they lose their classes (all 0)."""
-        keys, key_of_segment = renumber(self.pred.keys)
-        pairs, pair = renumber(self.truth_of * max(len(keys), 1) + key_of_segment[self.pred_of])
-        truth_of, pred_of = np.divmod(pairs, max(len(keys), 1))
-        points = totals(pair, self.points, len(pairs))
-        return Overlaps(Segments(np.zeros_like(keys), keys), self.truth, pred_of, truth_of, points)
 
 
 class Matches(NamedTuple):
@@ -66,6 +33,49 @@ class Matches(NamedTuple):
     def where(self, chosen: Bool[np.ndarray, "matches"]) -> "Matches":
         """Only the chosen ones."""
         return Matches(self.pred[chosen], self.truth[chosen], self.iou[chosen])
+
+
+@dataclass
+class Overlaps:
+    """The pairs of a predicted and a true segment that share points; ``points`` says how many."""
+
+    pred: Segments
+    truth: Segments
+    pred_of: Int64[np.ndarray, "pairs"]  # index of the pair's predicted segment
+    truth_of: Int64[np.ndarray, "pairs"]
+    points: Int64[np.ndarray, "pairs"]
+
+    @cached_property
+    def pred_areas(self) -> Int64[np.ndarray, "segments"]:
+        """Points of each predicted segment; 0 for one that lost all its pairs."""
+        return totals(self.pred_of, self.points, len(self.pred.keys))
+
+    @cached_property
+    def truth_areas(self) -> Int64[np.ndarray, "segments"]:
+        """Points of each true segment."""
+        return totals(self.truth_of, self.points, len(self.truth.keys))
+
+    @cached_property
+    def matches_above_half(self) -> Matches:
+        """Pairs whose IoU is above one half, of whatever classes; no segment can have two."""
+        union = self.truth_areas[self.truth_of] + self.pred_areas[self.pred_of] - self.points
+        return Matches(self.pred_of, self.truth_of, self.points / union).where(2 * self.points > union)
+
+    @cached_property
+    def known(self) -> "Overlaps":
+        """Without the points whose truth is void, for which no evaluator gives credit or blame."""
+        known = self.truth.classes[self.truth_of] != 0
+        return Overlaps(self.pred, self.truth, self.pred_of[known], self.truth_of[known], self.points[known])
+
+    def by_predicted_key(self) -> "Overlaps":
+        """Predicted segments told apart by their keys alone; they lose their classes (all 0)."""
+        keys, key_of_segment = renumber(self.pred.keys)
+        pred = Segments(np.zeros_like(keys), keys)
+        if len(keys) == len(self.pred.keys):  # as with whole labels: segments ascend by key
+            return Overlaps(pred, self.truth, self.pred_of, self.truth_of, self.points)
+        pairs, pair = renumber(self.truth_of * len(keys) + key_of_segment[self.pred_of])
+        truth_of, pred_of = np.divmod(pairs, len(keys))
+        return Overlaps(pred, self.truth, pred_of, truth_of, totals(pair, self.points, len(pairs)))
 
 
 def find_overlaps(
@@ -83,13 +93,6 @@ def find_overlaps(
     pairs, pair = renumber(truth_of_run * count + pred_of_run)
     truth_of, pred_of = np.divmod(pairs, count)
     return Overlaps(pred, truth, pred_of, truth_of, totals(pair, length, len(pairs)))
-
-
-def matches_above_half(overlaps: Overlaps) -> Matches:
-    """Pairs whose IoU is above one half, of whatever classes; no segment can have two."""
-    pred, truth, points = overlaps.pred_of, overlaps.truth_of, overlaps.points
-    iou = points / (overlaps.truth_areas[truth] + overlaps.pred_areas[pred] - points)
-    return Matches(pred, truth, iou).where(iou > 0.5)
 
 
 def among(classes: Int64[np.ndarray, "items"], chosen: Collection[int]) -> Bool[np.ndarray, "items"]:

@@ -14,7 +14,7 @@ import torch
 from jaxtyping import Bool, Float64, Int64
 from torch import Tensor
 
-from most.metrics.overlaps import Matches, Overlaps, find_overlaps, matches_above_half, totals
+from most.metrics.overlaps import Matches, Overlaps, find_overlaps, totals
 
 EPS = 1e-15  # the official evaluators' guard: a class that never occurs scores 0, and stays in the means
 
@@ -65,7 +65,7 @@ def panoptic_statistics(
 
 def panoptic_statistics_of(overlaps: Overlaps, num_classes: int, min_points: int) -> PanopticStatistics:
     """The same from overlaps that are found already."""
-    known = overlaps.known()
+    known = overlaps.known
     pred, truth = known.pred, known.truth
     match = true_positives(known)
     false = (known.pred_areas >= max(min_points, 1)) & (pred.classes != 0)
@@ -85,7 +85,7 @@ def panoptic_statistics_of(overlaps: Overlaps, num_classes: int, min_points: int
 
 def true_positives(known: Overlaps) -> Matches:
     """The segments of one class that overlap by more than half; ``known`` has no points of void truth."""
-    match = matches_above_half(known)
+    match = known.matches_above_half
     return match.where(known.pred.classes[match.pred] == known.truth.classes[match.truth])
 
 

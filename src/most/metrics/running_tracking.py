@@ -45,7 +45,7 @@ class _LSTQ(TableMetric):
         """Add one scan of a sequence; every process has to give a sequence the same number."""
         overlaps = find_overlaps(pred_semantics, pred_ids, truth_semantics, truth_ids)
         scan = tube_statistics(overlaps, sequence, self.rules, len(self.class_names))
-        self.confusion = self.confusion + scan.confusion.to(self.device)
+        self.confusion.add_(scan.confusion.to(self.device))
         for name in ("truth", "pred", "overlaps"):
             self.add_rows(name, getattr(scan, name))
 
@@ -125,10 +125,10 @@ class PanopticTracking(TableMetric):
         memory = self._memories.get(sequence, TrackMemory())
         scan, self._memories[sequence] = tracking_statistics(overlaps, sequence, memory, self.rules)
         for name in COUNTS:
-            setattr(self, name, getattr(self, name) + getattr(scan.panoptic, name).to(self.device))
-        self.switches = self.switches + scan.switches.to(self.device)
-        self.iou_sum = self.iou_sum + exact_parts(scan.panoptic.iou_sum).to(self.device)
-        self.soft_switches = self.soft_switches + exact_parts(scan.soft_switches).to(self.device)
+            getattr(self, name).add_(getattr(scan.panoptic, name).to(self.device))
+        self.switches.add_(scan.switches.to(self.device))
+        self.iou_sum.add_(exact_parts(scan.panoptic.iou_sum).to(self.device))
+        self.soft_switches.add_(exact_parts(scan.soft_switches).to(self.device))
         for name in self.tables:
             self.add_rows(name, getattr(scan, name))
 

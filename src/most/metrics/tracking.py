@@ -12,7 +12,7 @@ import torch
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
-from most.metrics.overlaps import Overlaps, among, matches_above_half
+from most.metrics.overlaps import Overlaps, among
 from most.metrics.panoptic import PanopticStatistics, panoptic_statistics_of, true_positives
 from most.metrics.tables import table
 
@@ -56,7 +56,7 @@ def tracking_statistics(
 
     The keys of ``overlaps`` are whole labels; ``sequence`` numbers the sequence. Points of void truth count nowhere.
     """
-    known = overlaps.known()
+    known = overlaps.known
     matches = _thing_matches(known, rules)
     switches, soft_switches = _switches(memory.matches, matches, rules.num_classes)
 
@@ -89,18 +89,17 @@ def _switches(
     before: dict[Track, tuple[int, float]], now: dict[Track, tuple[int, float]], num_classes: int
 ) -> tuple[Int64[Tensor, "classes"], Float64[Tensor, "classes"]]:
     """Instances found in both scans, but under different keys: how many of each class, and their IoUs now."""
-    switches, soft_switches = torch.zeros(num_classes, dtype=torch.int64), torch.zeros(num_classes, dtype=torch.float64)
-    for track in before.keys() & now.keys():
-        key, iou = now[track]
-        if before[track][0] != key:
+    switches, soft_switches = np.zeros(num_classes, dtype=np.int64), np.zeros(num_classes)
+    for track, (key, iou) in now.items():
+        if track in before and before[track][0] != key:
             switches[track[0]] += 1
             soft_switches[track[0]] += iou
-    return switches, soft_switches
+    return torch.from_numpy(switches), torch.from_numpy(soft_switches)
 
 
 def _labels(regardless: Overlaps, rules: TrackingRules) -> dict[Track, int]:
     """The label that every instance with enough points is matched with, whatever its class."""
-    match = matches_above_half(regardless)
+    match = regardless.matches_above_half
     label_of = np.full(len(regardless.truth.keys), UNMATCHED)
     label_of[match.truth] = regardless.pred.keys[match.pred]
     followed = among(regardless.truth.classes, rules.things) & (regardless.truth_areas > rules.min_points)

@@ -58,7 +58,7 @@ def tube_statistics(overlaps: Overlaps, sequence: int, rules: TubeRules, num_cla
     shares with an id, but for the size of the id only those predicted as certain classes (and, for nuScenes, where
     they are enough in the scan), so that a tube may share more than it has: ``overlaps`` has both counts.
     """
-    known = overlaps.known()
+    known = overlaps.known
     truth = known.truth
     tubes = among(truth.classes, rules.truth_classes) & _is_instance(truth.keys, rules)
     tubes &= known.truth_areas > rules.min_points
