@@ -65,7 +65,7 @@ def lstq_semantickitti(statistics: TubeStatistics, things: Sequence[int]) -> dic
     counts = PointCounts.of(statistics.confusion)
     present = int((counts.union() > 0).sum())
     s_cls = _ratio(float(counts.iou().sum()), present)
-    official, repaired = associate(statistics), _of_classes(statistics, things)
+    official, repaired = associate(statistics), _repaired_association(statistics, things)
     stuff = [index for index in range(1, len(statistics.confusion)) if index not in things]
     return _lstq(official.mean_over(things), s_cls, repaired.mean_over(things)) | {
         "aq_p": _mean(official.precisions),
@@ -81,7 +81,9 @@ def lstq_semantickitti(statistics: TubeStatistics, things: Sequence[int]) -> dic
 def lstq_nuscenes(statistics: TubeStatistics, things: Sequence[int]) -> dict[str, float]:
     """``lstq s_assoc s_cls``, and ``lstq s_assoc`` ``_repaired``; S_cls is the mean IoU of all classes but void."""
     s_cls = float(PointCounts.of(statistics.confusion).iou()[1:].mean())
-    return _lstq(associate(statistics).mean_over(things), s_cls, _of_classes(statistics, things).mean_over(things))
+    return _lstq(
+        associate(statistics).mean_over(things), s_cls, _repaired_association(statistics, things).mean_over(things)
+    )
 
 
 def lstq_per_class(statistics: TubeStatistics, class_names: Sequence[str]) -> dict[str, dict[str, float]]:
@@ -101,7 +103,7 @@ def lstq_per_class(statistics: TubeStatistics, class_names: Sequence[str]) -> di
     }
 
 
-def _of_classes(statistics: TubeStatistics, things: Sequence[int]) -> Association:
+def _repaired_association(statistics: TubeStatistics, things: Sequence[int]) -> Association:
     """The association of true tubes of things alone, sharing points as sizes count them."""
     truth = statistics.truth[np.isin(statistics.truth[:, 1], list(things))]
     overlaps = statistics.overlaps[np.isin(statistics.overlaps[:, 1], list(things))]
