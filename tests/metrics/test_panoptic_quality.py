@@ -1,17 +1,15 @@
 """Panoptic figures: the official evaluators' goldens, cases worked out by hand, and properties."""
 
-import json
 import math
-from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
 import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
 from torch import Tensor
 
+from golden_cases import GoldenCase, golden_paths, name_of, read_golden
 from most.metrics.panoptic import (
     PanopticStatistics,
     class_figures,
@@ -21,8 +19,7 @@ from most.metrics.panoptic import (
 )
 from oracles.official_panoptic import OfficialPanoptic
 
-GOLDENS = sorted((Path(__file__).parents[1] / "goldens" / "semantickitti_pq").glob("*.json"))
-OFFICIAL_NAMES = {"pq": "pq_mean", "sq": "sq_mean", "rq": "rq_mean", "miou": "iou_mean"}
+SEMANTICKITTI_NAMES = {"pq": "pq_mean", "sq": "sq_mean", "rq": "rq_mean", "miou": "iou_mean"}
 PERSON, ROAD, CAR = 1, 2, 3  # training ids of the hand-made cases; car and person are things
 THINGS = [PERSON, CAR]
 
@@ -38,19 +35,37 @@ def statistics(
     return panoptic_statistics(*columns, num_classes=4, min_points=min_points)
 
 
-@pytest.mark.parametrize("path", GOLDENS, ids=lambda path: path.stem)
-def test_goldens(path: Path) -> None:
-    golden = json.loads(path.read_text())
-    classes = golden["expected"]["pq"]["per_class"]
-    total = PanopticStatistics.zeros(len(classes))
-    for scan in golden_scans(path.with_suffix(".npz")):
-        total += panoptic_statistics(*scan, num_classes=len(classes), min_points=golden["min_points"])
-
+@pytest.mark.parametrize("path", golden_paths("semantickitti_pq", "semantickitti_lstq"), ids=name_of)
+def test_semantickitti_goldens(path: Path) -> None:
+    golden = read_golden(path)
+    expected = golden.expected["pq"]
+    total = assert_official_rows(golden, expected)
     figures = panoptic_figures(total, things=range(1, 9))
-    for name in ("pq", "sq", "rq", "miou"):
-        assert figures[name] == pytest.approx(golden["expected"]["pq"]["overall"][OFFICIAL_NAMES[name]], abs=1e-9)
+    for name, official in SEMANTICKITTI_NAMES.items():
+        assert figures[name] == pytest.approx(expected["overall"][official], abs=1e-9)
     for name in ("pq_dagger", *(f"{m}_{part}" for m in ("pq", "sq", "rq") for part in ("things", "stuff"))):
-        assert figures[name] == pytest.approx(golden["expected"]["pq"]["overall"][name], abs=1e-9)
+        assert figures[name] == pytest.approx(expected["overall"][name], abs=1e-9)
+
+
+@pytest.mark.parametrize("path", golden_paths("nuscenes_pq", "nuscenes_pat_lstq"), ids=name_of)
+def test_nuscenes_goldens(path: Path) -> None:
+    golden = read_golden(path)
+    expected = golden.expected["segmentation"]
+    total = assert_official_rows(golden, expected)
+    figures = panoptic_figures(total, things=range(1, 11))
+    assert set(expected["overall"]) == {"PQ", "SQ", "RQ", "mIoU", "PQ_dagger"}
+    for official, value in expected["overall"].items():
+        assert figures[official.lower()] == pytest.approx(value, abs=1e-9)
+    for official, value in expected["derived"].items():
+        assert figures[official.lower().replace("iou", "miou")] == pytest.approx(value, abs=1e-9)
+
+
+def assert_official_rows(golden: GoldenCase, expected: dict) -> PanopticStatistics:
+    """The classes' figures are the official ones; returns the statistics of all scans."""
+    classes = expected["per_class"]
+    total = PanopticStatistics.zeros(len(classes))
+    for scan in golden.scans:
+        total += panoptic_statistics(*scan.labels, num_classes=len(classes), min_points=golden.min_points)
     rows = per_class(total, list(classes))
     assert list(rows) == list(classes)[1:]
     for name, row in rows.items():
@@ -60,16 +75,8 @@ def test_goldens(path: Path) -> None:
             [official[key] for key in ("PQ", "SQ", "RQ", "IoU")], abs=1e-9
         )
     assert total.iou_sum.tolist() == pytest.approx([row["sum_iou"] for row in classes.values()], abs=1e-9)
-    assert total.confusion.tolist() == golden["expected"]["pq"]["confusion_rows_pred_cols_gt"]
-
-
-def golden_scans(path: Path) -> list[tuple[Tensor, ...]]:
-    with np.load(path, allow_pickle=False) as arrays:
-        columns = [
-            torch.from_numpy(arrays[name].astype(np.int64)) for name in ("pred_sem", "pred_label", "gt_sem", "gt_label")
-        ]
-        bounds = arrays["frame_offsets"].tolist()
-    return [tuple(column[first:last] for column in columns) for first, last in pairwise(bounds)]
+    assert total.confusion.tolist() == expected["confusion_rows_pred_cols_gt"]
+    return total
 
 
 def test_two_cars_one_half_found() -> None:

@@ -3,12 +3,16 @@
 from most.metrics.membership import MembershipCounts, membership_counts
 from most.metrics.panoptic import PanopticStatistics, panoptic_figures, panoptic_statistics, per_class
 from most.metrics.running import MembershipAccuracy, PanopticQuality
+from most.metrics.running_tracking import NuScenesLSTQ, PanopticTracking, SemanticKITTILSTQ
 
 __all__ = [
     "MembershipAccuracy",
     "MembershipCounts",
+    "NuScenesLSTQ",
     "PanopticQuality",
     "PanopticStatistics",
+    "PanopticTracking",
+    "SemanticKITTILSTQ",
     "membership_counts",
     "panoptic_figures",
     "panoptic_statistics",

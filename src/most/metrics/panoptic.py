@@ -8,15 +8,13 @@ unmatched segments count only from ``min_points`` points on. Figures are fractio
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from jaxtyping import Bool, Float64, Int64
-from numpy.typing import NDArray
 from torch import Tensor
 
-from most.metrics.renumber import Integers, renumber
+from most.metrics.overlaps import Matches, Overlaps, find_overlaps, totals
 
 EPS = 1e-15  # the official evaluators' guard: a class that never occurs scores 0, and stays in the means
 
@@ -61,69 +59,41 @@ def panoptic_statistics(
     min_points: int,
 ) -> PanopticStatistics:
     """Compare one scan's prediction with its truth; keys are raw labels, classes training ids (0 is void)."""
-    columns = (pred_semantics, pred_keys, truth_semantics, truth_keys)
-    (pred_sem, pred_key, truth_sem, truth_key), length = _runs([column.cpu().numpy() for column in columns])
-    confusion = _totals(pred_sem * num_classes + truth_sem, length, num_classes**2)
+    overlaps = find_overlaps(pred_semantics, pred_keys, truth_semantics, truth_keys)
+    return panoptic_statistics_of(overlaps, num_classes, min_points)
 
-    known = truth_sem != 0
-    length = length[known]
-    pred = _Segments.find(pred_sem[known], pred_key[known], length, num_classes)
-    truth = _Segments.find(truth_sem[known], truth_key[known], length, num_classes)
-    match_pred, match_truth, iou = _matches(pred, truth, length)
 
-    false = (pred.areas >= min_points) & (pred.classes != 0)
-    missed = truth.areas >= min_points
-    false[match_pred] = False
-    missed[match_truth] = False
-    match_class = truth.classes[match_truth]
+def panoptic_statistics_of(overlaps: Overlaps, num_classes: int, min_points: int) -> PanopticStatistics:
+    """The same from overlaps that are found already."""
+    known = overlaps.known
+    pred, truth = known.pred, known.truth
+    match = true_positives(known)
+    false = (known.pred_areas >= max(min_points, 1)) & (pred.classes != 0)
+    missed = known.truth_areas >= max(min_points, 1)
+    false[match.pred] = False
+    missed[match.truth] = False
+    match_class = truth.classes[match.truth]
+    iou_sum = np.bincount(match_class, match.iou, num_classes).astype(np.float64)  # it gives integers for no items
     return PanopticStatistics(
-        confusion=torch.from_numpy(confusion).long().view(num_classes, num_classes),
-        iou_sum=torch.from_numpy(_totals(match_class, iou, num_classes)),
+        confusion=confusion_of(overlaps, num_classes),
+        iou_sum=torch.from_numpy(iou_sum),
         tp=torch.from_numpy(np.bincount(match_class, minlength=num_classes)),
         fp=torch.from_numpy(np.bincount(pred.classes[false], minlength=num_classes)),
         fn=torch.from_numpy(np.bincount(truth.classes[missed], minlength=num_classes)),
     )
 
 
-def _runs(columns: list[Integers]) -> tuple[list[Integers], Integers]:
-    """Merge neighbours that agree in every column, and count them: along a beam most do, so little work is left."""
-    count = len(columns[0])
-    starts = np.zeros(count, dtype=bool)
-    starts[:1] = True
-    for column in columns:
-        starts[1:] |= column[1:] != column[:-1]
-    first = np.flatnonzero(starts)
-    return [column[first] for column in columns], np.diff(first, append=count)
+def true_positives(known: Overlaps) -> Matches:
+    """The segments of one class that overlap by more than half; ``known`` has no points of void truth."""
+    match = known.matches_above_half
+    return match.where(known.pred.classes[match.pred] == known.truth.classes[match.truth])
 
 
-class _Segments(NamedTuple):
-    """The segments of one labelling of a scan: the (class, key) pairs that occur."""
-
-    classes: Integers
-    areas: NDArray[np.float64]  # points
-    of_run: Integers  # each run's segment
-
-    @classmethod
-    def find(cls, semantics: Integers, keys: Integers, length: Integers, num_classes: int) -> "_Segments":
-        """Number the pairs of class and key."""
-        codes, of_run = renumber(renumber(keys)[1] * num_classes + semantics)
-        return cls(codes % num_classes, _totals(of_run, length, len(codes)), of_run)
-
-
-def _matches(pred: _Segments, truth: _Segments, length: Integers) -> tuple[Integers, Integers, NDArray[np.float64]]:
-    """Predicted segment, true segment and IoU of each match; above one half no segment can have two."""
-    count = max(len(pred.classes), 1)
-    pairs, pair = renumber(truth.of_run * count + pred.of_run)
-    pair_truth, pair_pred = np.divmod(pairs, count)
-    overlap = _totals(pair, length, len(pairs))
-    iou = overlap / (truth.areas[pair_truth] + pred.areas[pair_pred] - overlap)
-    matched = (truth.classes[pair_truth] == pred.classes[pair_pred]) & (iou > 0.5)
-    return pair_pred[matched], pair_truth[matched], iou[matched]
-
-
-def _totals(index: Integers, amounts: NDArray[Any], size: int) -> NDArray[np.float64]:
-    """Sum the amounts that fall on each of ``size`` indices; exact for counts of points."""
-    return np.bincount(index, weights=amounts, minlength=size).astype(np.float64)  # it gives integers for no items
+def confusion_of(overlaps: Overlaps, num_classes: int) -> Int64[Tensor, "classes classes"]:
+    """Points of each pair of classes, indexed [predicted, truth]."""
+    pred, truth = overlaps.pred.classes[overlaps.pred_of], overlaps.truth.classes[overlaps.truth_of]
+    points = totals(pred * num_classes + truth, overlaps.points, num_classes**2)
+    return torch.from_numpy(points).view(num_classes, num_classes)
 
 
 def class_figures(statistics: PanopticStatistics) -> ClassFigures:
@@ -131,11 +101,31 @@ def class_figures(statistics: PanopticStatistics) -> ClassFigures:
     tp = statistics.tp.double()
     sq = statistics.iou_sum / tp.clamp(min=EPS)
     rq = tp / (tp + statistics.fp / 2 + statistics.fn / 2).clamp(min=EPS)
-    confusion = statistics.confusion.double()
-    confusion[:, 0] = 0
-    hits = confusion.diagonal()
-    union = confusion.sum(0) + confusion.sum(1) - hits
-    return ClassFigures(sq * rq, sq, rq, hits / union.clamp(min=EPS))
+    return ClassFigures(sq * rq, sq, rq, PointCounts.of(statistics.confusion).iou())
+
+
+@dataclass
+class PointCounts:
+    """Points of known truth by class: predicted rightly, predicted at all, and there to be found."""
+
+    hits: Float64[Tensor, "classes"]
+    predicted: Float64[Tensor, "classes"]
+    true: Float64[Tensor, "classes"]
+
+    @classmethod
+    def of(cls, confusion: Int64[Tensor, "classes classes"]) -> "PointCounts":
+        """Count from a confusion matrix indexed [predicted, truth]; points of void truth are left out."""
+        known = confusion.double()
+        known[:, 0] = 0
+        return cls(known.diagonal(), known.sum(1), known.sum(0))
+
+    def union(self) -> Float64[Tensor, "classes"]:
+        """Points that are of a class by prediction or by truth."""
+        return self.predicted + self.true - self.hits
+
+    def iou(self) -> Float64[Tensor, "classes"]:
+        """0 for a class that never occurs."""
+        return self.hits / self.union().clamp(min=EPS)
 
 
 def panoptic_figures(statistics: PanopticStatistics, things: Sequence[int]) -> dict[str, float]:

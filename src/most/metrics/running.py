@@ -8,9 +8,12 @@ from jaxtyping import Float, Int64
 from torch import Tensor
 from torchmetrics import Metric
 
+from most.metrics.exact_sums import exact_parts, joined
 from most.metrics.membership import MembershipCounts, membership_counts
 from most.metrics.panoptic import PanopticStatistics, panoptic_figures, panoptic_statistics, per_class
 from most.structures import Detections, Instances
+
+COUNTS = ("confusion", "tp", "fp", "fn")  # of PanopticStatistics; the sums of IoUs are added up apart
 
 
 class PanopticQuality(Metric):
@@ -18,14 +21,16 @@ class PanopticQuality(Metric):
 
     full_state_update = False
     higher_is_better = True
+    iou_sum: Tensor
 
     def __init__(self, class_names: Sequence[str], things: Sequence[int], min_points: int) -> None:
         """``class_names`` are indexed by training id, void first; ``things`` are training ids."""
         super().__init__()
         self.class_names, self.things, self.min_points = list(class_names), list(things), min_points
         zeros = PanopticStatistics.zeros(len(self.class_names))
-        for field in fields(zeros):
-            self.add_state(field.name, default=getattr(zeros, field.name), dist_reduce_fx="sum")
+        for name in COUNTS:
+            self.add_state(name, default=getattr(zeros, name), dist_reduce_fx="sum")
+        self.add_state("iou_sum", default=exact_parts(zeros.iou_sum), dist_reduce_fx="sum")
 
     def update(
         self,
@@ -38,8 +43,9 @@ class PanopticQuality(Metric):
         scan = panoptic_statistics(
             pred_semantics, pred_keys, truth_semantics, truth_keys, len(self.class_names), self.min_points
         )
-        for field in fields(scan):
-            setattr(self, field.name, getattr(self, field.name) + getattr(scan, field.name).to(self.device))
+        for name in COUNTS:
+            setattr(self, name, getattr(self, name) + getattr(scan, name).to(self.device))
+        self.iou_sum = self.iou_sum + exact_parts(scan.iou_sum).to(self.device)
 
     def compute(self) -> dict[str, float]:
         """Return the means, see :func:`most.metrics.panoptic.panoptic_figures`."""
@@ -51,7 +57,8 @@ class PanopticQuality(Metric):
             return per_class(self._statistics(), self.class_names)
 
     def _statistics(self) -> PanopticStatistics:
-        return PanopticStatistics(*(getattr(self, field.name).cpu() for field in fields(PanopticStatistics)))
+        counts = {name: getattr(self, name).cpu() for name in COUNTS}
+        return PanopticStatistics(iou_sum=joined(self.iou_sum).cpu(), **counts)
 
 
 class MembershipAccuracy(Metric):
