@@ -25,7 +25,7 @@ COMPONENTS = {
     "metrics": {"membership"},
     "simulation": {"datasets"},
 }
-ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw"}
+ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw", "submit"}
 OUTER = {"entry", "config", "assembly", "training", "checks"}
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from most import predicting
+from most.datasets import semantickitti
 from most.datasets.dataset import WindowDataset
 from most.datasets.reader import Frame
 from most.datasets.semantickitti import SemanticKITTI, Splits
@@ -14,7 +14,7 @@ from most.inference import Prediction
 from most.predicting import claim_folder, read_prediction, unfinished, write_prediction, write_predictions
 from most.structures import Detections, Panoptic
 from semantickitti_tree import write_sequence
-from tiny import CAR, PERSON, ROAD, TAXONOMY, tiny_predictor
+from tiny import CAR, PERSON, ROAD, tiny_predictor
 
 ONE_CAR = Detections(
     torch.tensor([CAR]), torch.tensor([0.75]), torch.tensor([[1.0, 2.0, -0.5]]), torch.tensor([[2.0, 1.0, 0.7]]),
@@ -47,10 +47,10 @@ def write_all(reader, frames, out):
 
 
 @pytest.mark.parametrize("prediction", [PREDICTION, NOTHING])
-def test_what_is_written_is_read_back(tmp_path, prediction):
+def test_what_is_written_is_read_back(reader, tmp_path, prediction):
     path = tmp_path / "sequences" / "08" / "predictions" / "000000.label"
-    write_prediction(prediction, path, TAXONOMY)
-    again = read_prediction(path, TAXONOMY)
+    write_prediction(prediction, reader, path)
+    again = read_prediction(reader, path)
     for part in ("panoptic", "detections"):
         for name, value in vars(getattr(prediction, part)).items():
             assert torch.equal(getattr(getattr(again, part), name), value), name
@@ -58,17 +58,18 @@ def test_what_is_written_is_read_back(tmp_path, prediction):
     assert torch.equal(again.claimed, prediction.claimed)
 
 
-def test_an_id_too_large_for_the_format_is_refused_unwritten(tmp_path):
+def test_an_id_too_large_for_the_format_is_refused_unwritten(reader, tmp_path):
     path = tmp_path / "sequences" / "08" / "predictions" / "000000.label"
     with pytest.raises(DataError, match=r"instance ids: expected 0\.\.65535, found 0\.\.65536"):
-        write_prediction(replace(PREDICTION, panoptic=Panoptic(torch.tensor([1, 9]), torch.tensor([65536, 0]))), path,
-                         TAXONOMY)  # fmt: skip
+        write_prediction(
+            replace(PREDICTION, panoptic=Panoptic(torch.tensor([1, 9]), torch.tensor([65536, 0]))), reader, path
+        )
     assert not path.exists()
 
 
-def test_a_prediction_that_is_not_there_is_named(tmp_path):
+def test_a_prediction_that_is_not_there_is_named(reader, tmp_path):
     with pytest.raises(DataError, match=r"000000\.label: expected a label file, found none"):
-        read_prediction(tmp_path / "000000.label", TAXONOMY)
+        read_prediction(reader, tmp_path / "000000.label")
 
 
 def test_every_sweep_gets_labels_and_detections(reader, tmp_path):
@@ -77,7 +78,7 @@ def test_every_sweep_gets_labels_and_detections(reader, tmp_path):
     names = [f"sequences/08/{kind}" for kind in ("detections/{}.npz", "predictions/{}.label")]
     assert files(out) == [name.format(f"{index:06d}") for name in names for index in range(3)]
     for frame in frames:
-        found = read_prediction(reader.prediction_path(out, frame), TAXONOMY).panoptic
+        found = read_prediction(reader, reader.prediction_path(out, frame)).panoptic
         assert len(found.semantics) == len(reader.labels(frame))
         assert (found.semantics > 0).all()
 
@@ -101,7 +102,7 @@ def test_labels_are_written_last_so_that_half_a_prediction_is_none(reader, tmp_p
         raise OSError("no space left on device")
 
     with monkeypatch.context() as broken:
-        broken.setattr(predicting, "write_labels", full)
+        broken.setattr(semantickitti, "write_labels", full)
         with pytest.raises(OSError, match="no space"):
             write_all(reader, frames, out)
     assert files(out) == ["sequences/08/detections/000000.npz"]
@@ -109,7 +110,7 @@ def test_labels_are_written_last_so_that_half_a_prediction_is_none(reader, tmp_p
     with monkeypatch.context() as broken:
         broken.setattr("most.files.os.fsync", full)  # within a write: the file is there, but not whole
         with pytest.raises(OSError, match="no space"):
-            write_prediction(PREDICTION, reader.prediction_path(out, frames[1]), TAXONOMY)
+            write_prediction(PREDICTION, reader, reader.prediction_path(out, frames[1]))
     assert files(out) == ["sequences/08/detections/000000.npz"]
 
 

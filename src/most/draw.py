@@ -11,7 +11,6 @@ from omegaconf import MISSING, DictConfig
 from most.config import conf_dir, register, store_root, typed
 from most.datasets.dataset import WindowDataset
 from most.datasets.reader import Frame, Reader
-from most.datasets.semantickitti import SemanticKITTI
 from most.entry import run, start
 from most.geometry.similarity import Similarity
 from most.modal.build import LabelRules, build_table
@@ -39,9 +38,9 @@ store_root("draw", DrawConfig)
 
 def draw(config: DrawConfig) -> None:
     """Draw prediction, truth (where there are labels) and errors of one sweep in bird's-eye view."""
-    reader = SemanticKITTI(config.dataset.root, config.dataset.splits)
+    reader = config.dataset.reader()
     frame = Frame(config.sequence, config.index)
-    prediction = read_prediction(reader.prediction_path(Path(config.predictions), frame), reader.taxonomy)
+    prediction = read_prediction(reader, reader.prediction_path(Path(config.predictions), frame))
     sample = WindowDataset(reader, [frame], previous=0, instances=partial(instances_of_one, reader))[0]
     save(draw_prediction(sample, prediction, reader.taxonomy), Path(config.out))
 

@@ -8,8 +8,6 @@ import hydra
 from omegaconf import MISSING, DictConfig
 
 from most.config import conf_dir, register, store_root, typed
-from most.datasets.labels import read_labels
-from most.datasets.semantickitti import SemanticKITTI
 from most.entry import run, start
 from most.metrics.folders import evaluate_folder
 from most.metrics.report import format_table, write_report
@@ -19,7 +17,7 @@ from most.metrics.report import format_table, write_report
 class EvaluateConfig:
     """What ``most.evaluate`` is told."""
 
-    predictions: str = MISSING  # holds sequences/NN/predictions/*.label, ours or anyone's
+    predictions: str = MISSING  # holds the dataset's official prediction files, ours or anyone's
     out: str = "metrics.json"
     split: str = "val"
     dataset: Any = None
@@ -31,9 +29,9 @@ store_root("evaluate", EvaluateConfig)
 
 def evaluate(config: EvaluateConfig) -> None:
     """Write the report to ``out`` and print its table; labels are needed of the dataset, scans are not."""
-    reader = SemanticKITTI(config.dataset.root, config.dataset.splits)
+    reader = config.dataset.reader()
     frames = reader.labelled_frames(config.split)
-    report = evaluate_folder(reader, frames, Path(config.predictions), read_labels)
+    report = evaluate_folder(reader, frames, Path(config.predictions))
     write_report(Path(config.out), report)
     taxonomy = reader.taxonomy
     print(format_table(report["panoptic"], [taxonomy.class_names[thing] for thing in taxonomy.things]))

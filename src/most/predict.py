@@ -12,7 +12,6 @@ from torch.utils.data import DataLoader
 from most.assembly import load_trained
 from most.config import conf_dir, register, store_root, typed
 from most.datasets.dataset import WindowDataset
-from most.datasets.semantickitti import SemanticKITTI
 from most.entry import run, start
 from most.errors import ConfigError
 from most.membership import Nearest
@@ -46,11 +45,11 @@ store_root("predict", PredictConfig)
 
 
 def predict(config: PredictConfig) -> None:
-    """Write ``sequences/NN/predictions/*.label`` and ``sequences/NN/detections/*.npz`` to the folder ``out``."""
+    """Write the dataset's official prediction files, and detections beside them, to the folder ``out``."""
     checkpoint, out, dataset = Path(config.checkpoint), Path(config.out), config.dataset
     trained = load_trained(checkpoint)
     predictor = replace(trained.predictor, membership=Nearest()) if config.nearest else trained.predictor
-    reader = SemanticKITTI(dataset.root, dataset.splits)
+    reader = dataset.reader()
     frames = reader.frames(config.split)
     claim_folder(out, checkpoint, reader, config.split, "nearest" if config.nearest else "trained")
     frames = unfinished(reader, frames, out)

@@ -8,9 +8,7 @@ from pathlib import Path
 import torch
 from tqdm import tqdm
 
-from most.datasets.labels import read_labels, write_labels
 from most.datasets.reader import Frame, Reader
-from most.datasets.taxonomy import Taxonomy
 from most.errors import DataError
 from most.files import atomic_write, is_partial
 from most.inference import Prediction, Predictor
@@ -61,19 +59,19 @@ def write_predictions(
             moved = [sample.to(device) for sample in samples]
             for sample, prediction in zip(samples, predictor(moved), strict=True):
                 path = reader.prediction_path(out, Frame(sample.sequence, sample.index))
-                write_prediction(prediction.to("cpu"), path, reader.taxonomy)
+                write_prediction(prediction.to("cpu"), reader, path)
                 progress.update()
 
 
-def read_prediction(path: Path, taxonomy: Taxonomy) -> Prediction:
+def read_prediction(reader: Reader, path: Path) -> Prediction:
     """Read back what ``write_prediction`` wrote; DataError where it is not there."""
-    raw, found = read_labels(path), read_assignments(assignments_path(path))
-    panoptic = Panoptic(taxonomy.to_training(raw, path), taxonomy.instance_of(raw))
+    labels, found = reader.read_prediction(path), read_assignments(assignments_path(path))
+    panoptic = Panoptic(reader.taxonomy.decode(labels, path), reader.taxonomy.instance_of(labels))
     return Prediction(panoptic, found.detections, found.roi, found.assigned)
 
 
-def write_prediction(prediction: Prediction, path: Path, taxonomy: Taxonomy) -> None:
+def write_prediction(prediction: Prediction, reader: Reader, path: Path) -> None:
     """Write one sweep's detections, then its labels: where labels are, all is."""
     found = Assignments(prediction.detections, prediction.roi, prediction.claimed)
     write_assignments(assignments_path(path), found)
-    write_labels(path, taxonomy.encode(prediction.panoptic.semantics, prediction.panoptic.ids))
+    reader.write_prediction(path, reader.taxonomy.encode(prediction.panoptic.semantics, prediction.panoptic.ids))

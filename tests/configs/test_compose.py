@@ -16,6 +16,7 @@ REQUIRED = {
     "draw": ["predictions=a", "sequence='08'"],
     "predict": ["checkpoint=a.ckpt", "out=b"],
     "evaluate": ["predictions=a"],
+    "submit": ["predictions=a"],
 }
 
 

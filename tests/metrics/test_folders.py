@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 
-from most.datasets.labels import read_labels
 from most.datasets.reader import Frame
 from most.datasets.semantickitti import SemanticKITTI, Splits
 from most.errors import DataError
@@ -54,7 +53,7 @@ class Tree:
 
     def evaluate(self, *sequences: str) -> dict:
         reader = SemanticKITTI(self.root, Splits(val=list(sequences)))
-        return evaluate_folder(reader, reader.labelled_frames("val"), self.predictions, read_labels, progress=False)
+        return evaluate_folder(reader, reader.labelled_frames("val"), self.predictions, progress=False)
 
 
 @pytest.fixture
@@ -162,7 +161,7 @@ def test_a_split_without_labels_is_refused(tree: Tree) -> None:
         tree.evaluate("08")
     reader = SemanticKITTI(tree.root, Splits(val=["08"]))
     with pytest.raises(DataError, match="expected scans to score, found none"):
-        evaluate_folder(reader, [], tree.predictions, read_labels)
+        evaluate_folder(reader, [], tree.predictions)
     write(tree.prediction("08", 0), [ROAD])
     with pytest.raises(DataError, match=r"labels/000000\.label"):
-        evaluate_folder(reader, [Frame("08", 0)], tree.predictions, read_labels, progress=False)
+        evaluate_folder(reader, [Frame("08", 0)], tree.predictions, progress=False)

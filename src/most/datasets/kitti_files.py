@@ -22,15 +22,21 @@ RIGID = 1e-3  # how far off a rotation's entries may be: files print six digits 
 
 def read_scan(path: Path) -> Float32[Tensor, "points 4"]:
     """Read x, y, z (m, sensor) and remission in [0, 1]."""
+    count_points(path)
+    return torch.from_numpy(np.frombuffer(path.read_bytes(), "<f4").astype(np.float32).reshape(-1, 4))
+
+
+def count_points(path: Path) -> int:
+    """Count a scan's points by its size; a DataError where there is no whole number of them."""
     if not path.is_file():
         raise DataError(f"{path}: expected a scan, found no file; copy the sequence's velodyne folder again")
-    content = path.read_bytes()
-    if len(content) % POINT.itemsize:
+    size = path.stat().st_size
+    if size % POINT.itemsize:
         raise DataError(
             f"{path}: expected a multiple of {POINT.itemsize} bytes (float32 x, y, z, remission a point), "
-            f"found {len(content)}; the file is cut off or no scan: copy it again"
+            f"found {size}; the file is cut off or no scan: copy it again"
         )
-    return torch.from_numpy(np.frombuffer(content, "<f4").astype(np.float32).reshape(-1, 4))
+    return size // POINT.itemsize
 
 
 def read_poses(folder: Path) -> Float64[Tensor, "rows 4 4"]:

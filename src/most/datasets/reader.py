@@ -72,6 +72,22 @@ class Reader(Protocol):
         """Files that the sequence's labelled sweeps are made of: large ones, and small ones of this sequence alone."""
         ...
 
+    def num_points(self, frame: Frame) -> int:
+        """How many points a sweep has, by the size of its file."""
+        ...
+
     def prediction_path(self, folder: Path, frame: Frame) -> Path:
         """Where a submission keeps its labels of a frame."""
+        ...
+
+    def read_prediction(self, path: Path) -> Int64[Tensor, "points"]:
+        """Read a submission's labels of a frame, as the taxonomy decodes them."""
+        ...
+
+    def write_prediction(self, path: Path, labels: Int64[Tensor, "points"]) -> None:
+        """Write a submission's labels of a frame, as the taxonomy encodes them."""
+        ...
+
+    def submission_notes(self, frames: list[Frame]) -> dict[str, bytes]:
+        """What a submission of these frames holds beside their labels: contents by name."""
         ...

@@ -10,8 +10,8 @@ from pathlib import Path
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
-from most.datasets.kitti_files import read_poses, read_rows, read_scan
-from most.datasets.labels import read_labels
+from most.datasets.kitti_files import count_points, read_poses, read_rows, read_scan
+from most.datasets.labels import read_labels, write_labels
 from most.datasets.reader import SPLITS, Frame
 from most.datasets.settings import DatasetSettings
 from most.datasets.splits import check_split, present_sequences
@@ -104,7 +104,7 @@ class SemanticKITTI:
 
     def sweep(self, frame: Frame) -> Sweep:
         """Read a scan with its pose, time and labels; non-finite points stay, since every point needs a label."""
-        points = read_scan(self.folder(frame.sequence) / "velodyne" / f"{_stem(frame)}.bin")
+        points = read_scan(self._scan_path(frame))
         labels = self.labels(frame) if self.has_labels(frame.sequence) else None
         if labels is not None and len(labels) != len(points):
             raise DataError(
@@ -137,7 +137,7 @@ class SemanticKITTI:
     def sources(self, sequence: str) -> tuple[list[Path], list[Path]]:
         """The scans and label files of a sequence, and its poses, calibration and times."""
         folder, frames = self.folder(sequence), self.frames_of(sequence)
-        scans = [folder / "velodyne" / f"{_stem(frame)}.bin" for frame in frames]
+        scans = list(map(self._scan_path, frames))
         labels = [self._label_path(frame) for frame in frames]
         texts = [folder / name for name in ("poses.txt", "calib.txt", "times.txt")]
         for path in labels + texts:
@@ -145,9 +145,28 @@ class SemanticKITTI:
                 raise DataError(f"{path}: expected a file beside the sequence's {len(frames)} scans, found none")
         return scans + labels, texts
 
+    def num_points(self, frame: Frame) -> int:
+        """How many points a scan has."""
+        return count_points(self._scan_path(frame))
+
     def prediction_path(self, folder: str | Path, frame: Frame) -> Path:
         """Where a submission keeps its labels of a frame."""
         return Path(folder) / "sequences" / frame.sequence / "predictions" / f"{_stem(frame)}.label"
+
+    def read_prediction(self, path: Path) -> Int64[Tensor, "points"]:
+        """Read a submission's labels of a frame: the same files as the truth's."""
+        return read_labels(path)
+
+    def write_prediction(self, path: Path, labels: Int64[Tensor, "points"]) -> None:
+        """Write a submission's labels of a frame."""
+        write_labels(path, labels)
+
+    def submission_notes(self, frames: list[Frame]) -> dict[str, bytes]:
+        """Nothing: the server takes labels alone."""
+        return {}
+
+    def _scan_path(self, frame: Frame) -> Path:
+        return self.folder(frame.sequence) / "velodyne" / f"{_stem(frame)}.bin"
 
     def _label_path(self, frame: Frame) -> Path:
         return self.folder(frame.sequence) / "labels" / f"{_stem(frame)}.label"

@@ -1,7 +1,7 @@
 """Scores a folder of predictions in the official layout, ours or anyone's, one scan at a time."""
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,6 @@ def evaluate_folder(
     reader: TruthReader[Frame],
     frames: Sequence[Frame],
     folder: Path,
-    read_labels: Callable[[Path], Int64[Tensor, "points"]],
     progress: bool = True,
 ) -> dict[str, Any]:
     """Score the predictions of ``frames`` in ``folder`` and return the report.
@@ -36,14 +35,14 @@ def evaluate_folder(
     for frame, path in tqdm(
         zip(frames, paths, strict=True), "evaluate", len(frames), unit="scan", disable=not progress
     ):
-        truth, prediction = reader.labels(frame), read_labels(path)
+        truth, prediction = reader.labels(frame), reader.read_prediction(path)
         if len(prediction) != len(truth):
             raise DataError(
                 f"{path}: expected a label for each of the scan's {len(truth)} points, found {len(prediction)}; "
                 "predict this scan again"
             )
         truth_semantics = taxonomy.to_training(truth, "truth of " + str(path))
-        semantics = taxonomy.to_training(prediction, path)
+        semantics = taxonomy.decode(prediction, path)
         panoptic += panoptic_statistics(
             semantics, prediction, truth_semantics, truth, len(taxonomy.class_names), taxonomy.min_points
         )

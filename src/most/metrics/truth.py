@@ -35,6 +35,10 @@ class Taxonomy(Protocol):
         """Classes of raw labels; raises DataError, naming ``source``, for labels that the dataset cannot have."""
         ...
 
+    def decode(self, labels: Int64[Tensor, "points"], source: object) -> Int64[Tensor, "points"]:
+        """Classes of a submission's labels; raises DataError, naming ``source``, for labels no submission can have."""
+        ...
+
     def is_thing(self, semantics: Int64[Tensor, "points"]) -> Bool[Tensor, "points"]:
         """Whether each class is a thing."""
         ...
@@ -59,6 +63,10 @@ class TruthReader(Protocol[Frame]):
 
     def sweep(self, frame: Frame) -> Sweep:
         """The scan itself."""
+        ...
+
+    def read_prediction(self, path: Path) -> Int64[Tensor, "points"]:
+        """A submission's labels of a frame; raises DataError where there are none."""
         ...
 
     def prediction_path(self, folder: Path, frame: Frame) -> Path:

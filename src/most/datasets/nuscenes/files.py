@@ -23,20 +23,26 @@ _NO_ARCHIVE = (OSError, EOFError, ValueError, KeyError, NotImplementedError, zip
 
 def read_scan(path: Path, token: str) -> Float32[Tensor, "points 4"]:
     """Read x, y, z (m, sensor) and intensity in [0, 1] of the sample_data ``token``."""
+    count_points(path, token)
+    points = np.frombuffer(path.read_bytes(), "<f4").astype(np.float32).reshape(-1, 5)[:, :4].copy()
+    points[:, 3] /= BRIGHTEST
+    return torch.from_numpy(points)
+
+
+def count_points(path: Path, token: str) -> int:
+    """Count a sweep's points by its size; a DataError where there is no whole number of them."""
     if not path.is_file():
         raise DataError(
             f"{path}: expected the sweep of sample_data {token}, found no file; copy samples/LIDAR_TOP and "
             "sweeps/LIDAR_TOP again, or do without the sweeps between key frames: dataset.sweeps=0"
         )
-    content = path.read_bytes()
-    if len(content) % POINT.itemsize:
+    size = path.stat().st_size
+    if size % POINT.itemsize:
         raise DataError(
             f"{path}: expected a multiple of {POINT.itemsize} bytes (float32 x, y, z, intensity, ring a point) of "
-            f"sample_data {token}, found {len(content)}; the file is cut off or no sweep: copy it again"
+            f"sample_data {token}, found {size}; the file is cut off or no sweep: copy it again"
         )
-    points = np.frombuffer(content, "<f4").astype(np.float32).reshape(-1, 5)[:, :4].copy()
-    points[:, 3] /= BRIGHTEST
-    return torch.from_numpy(points)
+    return size // POINT.itemsize
 
 
 def read_classes(path: Path) -> Int64[Tensor, "points"]:

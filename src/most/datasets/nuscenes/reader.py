@@ -4,6 +4,7 @@ A sequence is a scene, by its name; its frames are the lidar's sweeps by time, o
 annotated key frame. A submission keeps a key frame's labels under the token of its sweep.
 """
 
+import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from jaxtyping import Float64, Int64
 from torch import Tensor
 
 from most.datasets.nuscenes.boxes import AmodalBoxes, Annotations
-from most.datasets.nuscenes.files import read_classes, read_panoptic, read_scan
+from most.datasets.nuscenes.files import count_points, read_classes, read_panoptic, read_scan, write_panoptic
 from most.datasets.nuscenes.labels import LabelFiles
 from most.datasets.nuscenes.scenes import LidarSweep, Scenes
 from most.datasets.nuscenes.splits import VERSIONS, SceneSplits
@@ -22,6 +23,7 @@ from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError, DataError
 from most.structures import Sweep
 
+MODALITIES = {"use_camera": False, "use_lidar": True, "use_radar": False, "use_map": False, "use_external": False}
 TABLES = ("scene", "sample", "sample_data", "ego_pose", "calibrated_sensor", "sensor", "panoptic")
 
 
@@ -138,6 +140,24 @@ class PanopticNuScenes:
     def prediction_path(self, folder: str | Path, frame: Frame) -> Path:
         """Where a submission keeps its labels of a key frame: ``panoptic/SPLIT/TOKEN_panoptic.npz``."""
         return Path(folder) / "panoptic" / self.official_split(frame) / f"{self.token(frame)}_panoptic.npz"
+
+    def num_points(self, frame: Frame) -> int:
+        """How many points a sweep has."""
+        row = self._row(frame)
+        return count_points(self.root / row.filename, row.token)
+
+    def read_prediction(self, path: Path) -> Int64[Tensor, "points"]:
+        """Read a submission's labels of a key frame: class * 1000 + instance."""
+        return read_panoptic(path)
+
+    def write_prediction(self, path: Path, labels: Int64[Tensor, "points"]) -> None:
+        """Write a submission's labels of a key frame."""
+        write_panoptic(path, labels)
+
+    def submission_notes(self, frames: list[Frame]) -> dict[str, bytes]:
+        """``SPLIT/submission.json``: lidar alone was used."""
+        splits = sorted({self.official_split(frame) for frame in frames})
+        return {f"{split}/submission.json": json.dumps({"meta": MODALITIES}).encode() for split in splits}
 
     def official_split(self, frame: Frame) -> str:
         """What submissions call the split of a frame: val, test or train, with ``mini_`` before in the mini version."""
