@@ -85,7 +85,7 @@ def test_processes_share_a_split_in_order_and_no_sample_twice(tree: Path, monkey
     dataset = module(tree).dataset("train")
     shares = []
     for rank in range(3):
-        monkeypatch.setattr("most.datasets.sampler._rank", lambda rank=rank: rank)
+        monkeypatch.setattr("most.datasets.sampler.rank", lambda rank=rank: rank)
         monkeypatch.setattr("most.datasets.sampler.processes", lambda: 3)
         shares.append(list(OrderedSampler(dataset)))
         assert len(OrderedSampler(dataset)) == len(shares[-1])
