@@ -41,6 +41,13 @@ def test_the_report_and_the_table(folder: Path, monkeypatch: pytest.MonkeyPatch,
     assert sorted(path.name for path in folder.iterdir()) == ["data", "mine", "scores"]
 
 
+def test_the_threshold_of_segments_can_be_set(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The one road point, predicted as a car, is a segment that counts."""
+    command(monkeypatch, "predictions=mine", "out=metrics.json", "dataset.min_points=1")
+    panoptic = json.loads((folder / "metrics.json").read_text())["panoptic"]
+    assert (panoptic["pq_stuff_present"], panoptic["per_class"]["road"]["fn"]) == (0, 1)
+
+
 def test_a_mistake_is_one_message_and_no_report(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:

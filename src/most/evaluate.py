@@ -10,7 +10,7 @@ from omegaconf import MISSING, DictConfig
 from most.config import conf_dir, register, store_root, typed
 from most.entry import run, start
 from most.metrics.folders import evaluate_folder
-from most.metrics.report import format_table, write_report
+from most.metrics.report import format_sequences, format_table, write_report
 
 
 @dataclass
@@ -35,6 +35,7 @@ def evaluate(config: EvaluateConfig) -> None:
     write_report(Path(config.out), report)
     taxonomy = reader.taxonomy
     print(format_table(report["panoptic"], [taxonomy.class_names[thing] for thing in taxonomy.things]))
+    print(format_sequences(report))
 
 
 @hydra.main(version_base=None, config_path=str(conf_dir()), config_name="evaluate")

@@ -46,8 +46,8 @@ class SemanticKITTISettings(DatasetSettings):
     root: str = "data/semantickitti"  # holds sequences/
     splits: Splits = field(default_factory=Splits)
 
-    def reader(self) -> "SemanticKITTI":
-        """Make the reader of the tree; nothing is read yet."""
+    def official_reader(self) -> "SemanticKITTI":
+        """Make the reader of the tree."""
         return SemanticKITTI(self.root, self.splits)
 
 

@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic
 
 from jaxtyping import Float, Int64
 from torch import Tensor
@@ -13,6 +13,7 @@ from most.errors import DataError
 from most.metrics.assignments import assignments_path, read_assignments
 from most.metrics.membership import MembershipCounts, membership_counts
 from most.metrics.panoptic import PanopticStatistics, panoptic_figures, panoptic_statistics, per_class
+from most.metrics.sequences import SequenceScores
 from most.metrics.truth import Frame, Taxonomy, TruthReader, find_instances
 
 
@@ -22,37 +23,55 @@ def evaluate_folder(
     folder: Path,
     progress: bool = True,
 ) -> dict[str, Any]:
-    """Score the predictions of ``frames`` in ``folder`` and return the report.
+    """Score the predictions of ``frames``, in the order of time, in ``folder`` and return the report.
 
-    ``{"scans": ..., "panoptic": {pq, ..., membership_accuracy, membership_accuracy_contested, per_class}}``. The
-    membership accuracies are None unless the folder also holds detections and the dataset its scans. Raises DataError
-    for predictions that are missing or do not fit the truth, and for a split without labels.
+    ``{"scans": ..., "panoptic": {pq, ..., membership_accuracy, membership_accuracy_contested, per_class}}``, with
+    ``lstq`` or ``tracking`` beside, see :class:`SequenceScores`. The membership accuracies are None unless the folder
+    also holds detections and the dataset its scans. Raises DataError for predictions that are missing or do not fit
+    the truth, and for a split without labels.
     """
     paths = _prediction_paths(reader, frames, folder)
-    taxonomy = reader.taxonomy
-    panoptic = PanopticStatistics.zeros(len(taxonomy.class_names))
-    membership = MembershipCounts() if _has_assignments(reader, frames, paths) else None
+    scores = _Scores(reader, _has_assignments(reader, frames, paths))
     for frame, path in tqdm(
         zip(frames, paths, strict=True), "evaluate", len(frames), unit="scan", disable=not progress
     ):
-        truth, prediction = reader.labels(frame), reader.read_prediction(path)
-        if len(prediction) != len(truth):
+        scores.add(frame, path)
+    return {"scans": len(frames)} | scores.report()
+
+
+class _Scores(Generic[Frame]):
+    """All figures of a folder, summed over its scans."""
+
+    def __init__(self, reader: TruthReader[Frame], with_memberships: bool) -> None:
+        self.reader, self.taxonomy = reader, reader.taxonomy
+        self.panoptic = PanopticStatistics.zeros(len(self.taxonomy.class_names))
+        self.sequences = SequenceScores(self.taxonomy)
+        self.memberships = MembershipCounts() if with_memberships else None
+
+    def add(self, frame: Frame, path: Path) -> None:
+        """Score one scan's prediction."""
+        truth, labels = self.reader.labels(frame), self.reader.read_prediction(path)
+        if len(labels) != len(truth):
             raise DataError(
-                f"{path}: expected a label for each of the scan's {len(truth)} points, found {len(prediction)}; "
+                f"{path}: expected a label for each of the scan's {len(truth)} points, found {len(labels)}; "
                 "predict this scan again"
             )
-        truth_semantics = taxonomy.to_training(truth, "truth of " + str(path))
-        semantics = taxonomy.decode(prediction, path)
-        panoptic += panoptic_statistics(
-            semantics, prediction, truth_semantics, truth, len(taxonomy.class_names), taxonomy.min_points
-        )
-        if membership is not None:
-            points = reader.sweep(frame).points[:, :3]
-            membership += _memberships(assignments_path(path), points, semantics, truth, truth_semantics, taxonomy)
-    figures: dict[str, Any] = dict(panoptic_figures(panoptic, taxonomy.things))
-    unknown = {"membership_accuracy": None, "membership_accuracy_contested": None}
-    figures |= unknown if membership is None else membership.accuracies()
-    return {"scans": len(frames), "panoptic": figures | {"per_class": per_class(panoptic, taxonomy.class_names)}}
+        known = self.taxonomy.to_training(truth, "truth of " + str(path))
+        semantics = self.taxonomy.decode(labels, path)
+        size, smallest = len(self.taxonomy.class_names), self.taxonomy.min_points
+        self.panoptic += panoptic_statistics(semantics, labels, known, truth, size, smallest)
+        self.sequences.update(frame.sequence, semantics, labels, known, truth)
+        if self.memberships is not None:
+            points = self.reader.sweep(frame).points[:, :3]
+            self.memberships += _memberships(assignments_path(path), points, semantics, truth, known, self.taxonomy)
+
+    def report(self) -> dict[str, Any]:
+        """Return all sections."""
+        figures: dict[str, Any] = dict(panoptic_figures(self.panoptic, self.taxonomy.things))
+        unknown = {"membership_accuracy": None, "membership_accuracy_contested": None}
+        figures |= unknown if self.memberships is None else self.memberships.accuracies()
+        classes = {"per_class": per_class(self.panoptic, self.taxonomy.class_names)}
+        return {"panoptic": figures | classes} | self.sequences.report()
 
 
 def _prediction_paths(reader: TruthReader[Frame], frames: Sequence[Frame], folder: Path) -> list[Path]:

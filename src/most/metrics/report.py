@@ -20,6 +20,13 @@ COMPARED = {
     "contested": "membership_accuracy_contested",
 }
 
+SEQUENCES = {
+    "lstq": {"LSTQ": "lstq", "S_assoc": "s_assoc", "S_cls": "s_cls"},
+    "tracking": {
+        "PAT": "pat", "LSTQ": "lstq", "PTQ": "ptq", "sPTQ": "sptq", "TQ": "tq", "S_assoc": "s_assoc", "S_cls": "s_cls",
+    },
+}  # fmt: skip
+
 
 def write_report(path: Path, report: Mapping[str, Any]) -> None:
     """Write a report as JSON, whole or not at all; what is not a number becomes null."""
@@ -68,6 +75,15 @@ def format_table(panoptic: Mapping[str, Any], things: Collection[str]) -> str:
         }.items()
     ]
     return "\n".join(lines)
+
+
+def format_sequences(report: Mapping[str, Any]) -> str:
+    """The 4D figures of a report in percent, SemanticKITTI's or nuScenes'; nothing where it has none."""
+    for section, titles in SEQUENCES.items():
+        if section in report:
+            figures = {title: _percent(report[section].get(key)) for title, key in titles.items()}
+            return "  ".join(f"{title} {figure}" for title, figure in figures.items())
+    return ""
 
 
 def format_comparison(reports: Mapping[str, Mapping[str, Any]]) -> str:

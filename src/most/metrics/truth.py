@@ -9,12 +9,28 @@ from torch import Tensor
 
 from most.structures import Instances, Sweep
 
-Frame = TypeVar("Frame", contravariant=True)  # whatever names a sweep to its reader
+
+@runtime_checkable
+class SweepName(Protocol):
+    """Whatever names a sweep to its reader."""
+
+    @property
+    def sequence(self) -> str:
+        """The sequence it belongs to."""
+        ...
+
+
+Frame = TypeVar("Frame", bound=SweepName, contravariant=True)
 
 
 @runtime_checkable
 class Taxonomy(Protocol):
     """What the labels of the dataset mean; classes are training ids, 0 is void."""
+
+    @property
+    def name(self) -> str:
+        """Of the dataset."""
+        ...
 
     @property
     def class_names(self) -> list[str]:

@@ -40,8 +40,8 @@ class NuScenesSettings(DatasetSettings):
         if self.version not in VERSIONS:
             raise ConfigError(f"dataset.version: expected one of {', '.join(VERSIONS)}, found {self.version!r}")
 
-    def reader(self) -> "PanopticNuScenes":
-        """Make the reader of the tree; nothing is read yet."""
+    def official_reader(self) -> "PanopticNuScenes":
+        """Make the reader of the tree."""
         return PanopticNuScenes(self.root, self.version, self.splits)
 
 

@@ -1,0 +1,45 @@
+"""What a dataset's own 4D evaluator says of whole sequences (paper, Table V)."""
+
+from typing import Any
+
+from jaxtyping import Int64
+from torch import Tensor
+
+from most.metrics.running_tracking import NuScenesLSTQ, PanopticTracking, SemanticKITTILSTQ
+from most.metrics.truth import Taxonomy
+
+
+class SequenceScores:
+    """Scans of a sequence are added in the order of time."""
+
+    def __init__(self, taxonomy: Taxonomy) -> None:
+        self.taxonomy = taxonomy
+        self.numbers: dict[str, int] = {}  # of the sequences
+        rules = (taxonomy.class_names, taxonomy.things, taxonomy.min_points)
+        self.is_nuscenes = taxonomy.name == "nuscenes"
+        self.lstq = NuScenesLSTQ(*rules) if self.is_nuscenes else SemanticKITTILSTQ(*rules)
+        self.tracking = PanopticTracking(*rules) if self.is_nuscenes else None
+
+    def update(
+        self,
+        sequence: str,
+        semantics: Int64[Tensor, "points"],
+        labels: Int64[Tensor, "points"],
+        truth_semantics: Int64[Tensor, "points"],
+        truth_labels: Int64[Tensor, "points"],
+    ) -> None:
+        """Add a scan; labels are whole, as they are on disk."""
+        number = self.numbers.setdefault(sequence, len(self.numbers))
+        if self.tracking is None:
+            instance = self.taxonomy.instance_of
+            self.lstq.update(number, semantics, instance(labels), truth_semantics, instance(truth_labels))
+            return
+        self.lstq.update(number, semantics, labels, truth_semantics, truth_labels)
+        self.tracking.update(number, semantics, labels, truth_semantics, truth_labels)
+
+    def report(self) -> dict[str, Any]:
+        """Return the section ``lstq``, or on nuScenes ``tracking``, with ``per_class``; fractions in [0, 1]."""
+        lstq = self.lstq.compute()
+        if self.tracking is None:
+            return {"lstq": lstq | {"per_class": self.lstq.per_class()}}
+        return {"tracking": lstq | self.tracking.compute() | {"per_class": self.tracking.per_class()}}
