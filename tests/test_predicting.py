@@ -58,15 +58,6 @@ def test_what_is_written_is_read_back(reader, tmp_path, prediction):
     assert torch.equal(again.claimed, prediction.claimed)
 
 
-def test_an_id_too_large_for_the_format_is_refused_unwritten(reader, tmp_path):
-    path = tmp_path / "sequences" / "08" / "predictions" / "000000.label"
-    with pytest.raises(DataError, match=r"instance ids: expected 0\.\.65535, found 0\.\.65536"):
-        write_prediction(
-            replace(PREDICTION, panoptic=Panoptic(torch.tensor([1, 9]), torch.tensor([65536, 0]))), reader, path
-        )
-    assert not path.exists()
-
-
 def test_a_prediction_that_is_not_there_is_named(reader, tmp_path):
     with pytest.raises(DataError, match=r"000000\.label: expected a label file, found none"):
         read_prediction(reader, tmp_path / "000000.label")

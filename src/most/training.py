@@ -32,7 +32,7 @@ from most.stages.stage import Stage
 from most.viz.callback import BevPictures
 
 
-def build_stage(name: str, config: Config, data: SemanticKITTIDataModule, stage1: Path) -> Stage:
+def build_stage(name: str, config: Config, data: SweepDataModule, stage1: Path) -> Stage:
     """Make a stage, and tell the data how large its batches are; ``stage1`` is read for stage 2 alone."""
     if name == "detection":
         data.training_batch = config.dataset.batch_size

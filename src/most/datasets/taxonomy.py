@@ -105,11 +105,14 @@ class Taxonomy:
         return self._training_ids.to(raw.device)[classes]
 
     def encode(self, semantics: Int64[Tensor, "*points"], ids: Int64[Tensor, "*points"]) -> Int64[Tensor, "*points"]:
-        """Labels of a submission from classes and instance numbers (0 for stuff), which must fit the format."""
-        if ids.numel() and not 0 <= int(ids.min()) <= int(ids.max()) < self.label.step:
-            raise DataError(
-                f"instance ids: expected 0..{self.label.step - 1}, found {int(ids.min())}..{int(ids.max())}"
-            )
+        """Labels of a submission from classes and instance numbers, 0 for none.
+
+        Where numbers are too large for the format, each class's are given anew; see :func:`fit_numbers`.
+        """
+        if ids.numel() and int(ids.min()) < 0:
+            raise DataError(f"instance ids: expected numbers >= 0, found {int(ids.min())}")
+        if ids.numel() and int(ids.max()) >= self.label.step:
+            ids = fit_numbers(semantics, ids, self.label.step - 1)
         return self.label.join(self._written_ids.to(semantics.device)[semantics], ids)
 
     def decode(self, labels: Int64[Tensor, "*points"], source: object = "labels") -> Int64[Tensor, "*points"]:
@@ -152,6 +155,27 @@ class Taxonomy:
                 f"{source}: expected {kind} class ids 0..{end - 1} of {self.name}, found {int(classes.max())}; "
                 "check that these are labels of this dataset"
             )
+
+
+def fit_numbers(
+    semantics: Int64[Tensor, "*points"], ids: Int64[Tensor, "*points"], largest: int
+) -> Int64[Tensor, "*points"]:
+    """Number each class's instances from 1 by size, the largest first; those beyond ``largest`` share its number.
+
+    Ids of 0 stay.
+    """
+    numbered = ids != 0
+    classes, end = semantics[numbered], int(ids.max()) + 1
+    segments, row, sizes = torch.unique(classes * end + ids[numbered], return_inverse=True, return_counts=True)
+    order = sizes.argsort(descending=True, stable=True)
+    order = order[(segments[order] // end).argsort(stable=True)]  # by class, then by size
+    _, count = torch.unique_consecutive(segments[order] // end, return_counts=True)
+    first = (count.cumsum(0) - count).repeat_interleave(count)
+    number = torch.empty_like(order)
+    number[order] = torch.arange(1, len(order) + 1, device=ids.device) - first
+    fitted = torch.zeros_like(ids)
+    fitted[numbered] = number[row].clamp(max=largest)
+    return fitted
 
 
 def check_content(path: Path, content: Any) -> None:
