@@ -7,7 +7,6 @@ with copies of its first sweep, moved back step by step, so that the window is a
 """
 
 import argparse
-import resource
 import statistics
 import subprocess
 import sys
@@ -102,6 +101,12 @@ def memory(arguments: argparse.Namespace, sweeps: int) -> float:
     return float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
 
 
+def peak_memory() -> float:
+    """Peak resident memory of this process, GB; getrusage would count that of the process which started it."""
+    status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
+    return int(status["VmHWM"].split()[0]) / 1e6
+
+
 def step(stage: DetectionStage, sample: Sample) -> None:
     """One training step with the paper's optimiser."""
     optimizer = torch.optim.Adam(stage.network.parameters(), lr=1e-3)
@@ -134,7 +139,7 @@ def main() -> None:
             stage = stage_of(arguments.backbone, SemanticKITTI(arguments.data))
             step(stage, sample)
             step(stage, sample)
-            print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6)
+            print(peak_memory())
             return
         for sweeps in (1, WINDOW):
             report(arguments, sweeps, window(*place, sweeps, Path(folder)))
