@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 import torch
 
-from most.assembly import FORMAT, describe, load_trained
+from most.assembly import FORMAT, check_taxonomy, describe, load_trained
 from most.backbones import AsymmetricUNetSettings, ResidualUNetSettings
-from most.errors import DataError
+from most.datasets.taxonomy import Taxonomy
+from most.errors import ConfigError, DataError
 from most.heads import SemanticHead
 from most.membership import PointSegMLPSettings
 from tiny import TAXONOMY, cloud, street, tiny_parts, tiny_predictor, window
@@ -158,3 +159,9 @@ def test_checkpoints_of_other_models_are_refused_with_a_remedy(tmp_path, other):
 def test_a_list_is_no_checkpoint(tmp_path):
     with pytest.raises(DataError, match="another program"):
         load_trained(save(tmp_path, [1, 2]))
+
+
+def test_a_dataset_that_the_model_does_not_know_is_refused():
+    check_taxonomy(Taxonomy.load("nuscenes"), Taxonomy.load("nuscenes"))
+    with pytest.raises(ConfigError, match="dataset: expected one of nuscenes, which the model knows, found one of sem"):
+        check_taxonomy(Taxonomy.load("nuscenes"), Taxonomy.load("semantickitti"))

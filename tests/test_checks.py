@@ -11,6 +11,7 @@ from most.backbones import AsymmetricUNetSmallSettings
 from most.checks import check_resume, stages_to_run
 from most.config import Config, Heads
 from most.datasets.augment import Augment
+from most.datasets.reader import Frame
 from most.datasets.semantickitti import SemanticKITTI, SemanticKITTISettings, Splits
 from most.errors import ConfigError, DataError
 from most.membership import Nearest, PointSegMLPSettings
@@ -21,6 +22,8 @@ from most.stages.settings import StageSettings
 from most.stages.trainer import TrainerSettings
 from semantickitti_tree import write_sequence
 from tiny import TAXONOMY, tiny_parts
+
+FRAMES = [Frame("00", index) for index in range(4)]
 
 
 @pytest.fixture
@@ -47,7 +50,7 @@ def save(config: Config, folder: Path, stage: str) -> Path:
     path.parent.mkdir(exist_ok=True)
     content = {
         "most": describe(parts, TAXONOMY, 2),
-        "most_run": describe_run(config, stage, 4),
+        "most_run": describe_run(config, stage, FRAMES),
         "state_dict": {},
         "optimizer_states": [],
     }
@@ -92,7 +95,7 @@ def test_a_run_does_not_go_on_with_other_scans_in_another_folder_or_with_another
     with pytest.raises(ConfigError, match=rf"expected the run's own folder, .*add hydra\.run\.dir={tmp_path}"):
         check_resume(config, reader, tmp_path / "other")
     (reader.root / "sequences/00/velodyne/000003.bin").unlink()
-    with pytest.raises(ConfigError, match="began with scans = 4, found 3"):
+    with pytest.raises(ConfigError, match=r"began with scans\.00 = 4, found 3"):
         check_resume(config, SemanticKITTI(reader.root, reader.splits), tmp_path)
     config.stage.run = ["detection"]
     with pytest.raises(ConfigError, match="is of stage membership; expected one of detection"):
@@ -139,5 +142,5 @@ def test_checkpoints_of_another_run_are_not_overwritten(config, reader, tmp_path
 
 
 def test_what_a_run_says_of_itself_is_plain(config):
-    said = describe_run(config, "membership", 4)
+    said = describe_run(config, "membership", FRAMES)
     assert said["training"] == asdict(config.stage.membership)

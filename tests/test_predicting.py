@@ -1,6 +1,5 @@
 """Writing predictions: what is read back, what is left to do, and what is never left behind."""
 
-
 import pytest
 import torch
 

@@ -42,7 +42,7 @@ def membership(samples: list[Sample], mixing: Mixing | None = None) -> tuple[Mem
 
 
 def mixed_membership(samples: list[Sample]) -> tuple[MembershipStage, dict[str, Tensor]]:
-    return membership(samples, Mixing(scans=3, steps=1, pairs=10**6))
+    return membership(samples, Mixing(scans=8, steps=1, pairs=10**6))
 
 
 def gradients(make: Callable, samples: list[Sample]) -> tuple[dict[str, float], Gradients, Gradients]:

@@ -1,5 +1,7 @@
 """Putting the components together, and the checkpoint that takes them apart again."""
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -7,6 +9,7 @@ from typing import Any
 import torch
 
 from most.config import Config, from_plain, to_plain
+from most.datasets.reader import Frame
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError, DataError
 from most.heads import CentreHead, SemanticHead
@@ -75,14 +78,17 @@ def describe(parts: dict[str, Any], taxonomy: Taxonomy, sweeps: int) -> dict[str
     }
 
 
-def describe_run(config: Config, stage: str, scans: int) -> dict[str, Any]:
-    """Return what a stage's weights depend on besides its model, in plain types: a run goes on only with the same."""
+def describe_run(config: Config, stage: str, frames: Sequence[Frame]) -> dict[str, Any]:
+    """Return what a stage's weights depend on besides its model, in plain types: a run goes on only with the same.
+
+    ``frames`` are those to train on.
+    """
     return {
         "stage": stage,
         "training": asdict(getattr(config.stage, stage)),
         "augment": asdict(config.augment),
         "extent": to_plain("extent", config.extent),
-        "scans": scans,
+        "scans": dict(Counter(frame.sequence for frame in frames)),
         "seed": config.seed,
         "batch_size": config.dataset.batch_size,
         "processes": config.trainer.processes(),
@@ -92,6 +98,12 @@ def describe_run(config: Config, stage: str, scans: int) -> dict[str, Any]:
 def describe_taxonomy(taxonomy: Taxonomy) -> dict[str, Any]:
     """Return what the columns of logits and the channels of the heat map stand for."""
     return {"name": taxonomy.name, "class_names": list(taxonomy.class_names), "things": list(taxonomy.things)}
+
+
+def check_taxonomy(trained: Taxonomy, read: Taxonomy) -> None:
+    """Refuse a dataset that a model was not trained for: its classes would be written as the other's."""
+    if describe_taxonomy(trained) != describe_taxonomy(read):
+        raise ConfigError(f"dataset: expected one of {trained.name}, which the model knows, found one of {read.name}")
 
 
 @dataclass

@@ -74,14 +74,14 @@ def check_resume(config: Config, reader: Reader, folder: Path) -> str:
     parts = model_parts(config) | ({"membership": Nearest()} if stage == "detection" else {})
     expected = {
         "most": describe(parts, reader.taxonomy, config.dataset.sweeps),
-        "most_run": describe_run(config, stage, len(reader.frames("train"))),
+        "most_run": describe_run(config, stage, reader.frames("train")),
     }
     for part, now in expected.items():
-        began = _flat(saved[part])
-        for key, value in _flat(now).items():
-            if began.get(key) != value:
+        began, goes_on = _flat(saved[part]), _flat(now)
+        for key in goes_on | began:
+            if began.get(key) != goes_on.get(key):
                 raise ConfigError(
-                    f"resume: {path} began with {key} = {began.get(key)}, found {value}; "
+                    f"resume: {path} began with {key} = {began.get(key)}, found {goes_on.get(key)}; "
                     "repeat the settings it began with"
                 )
     home = path.resolve().parents[1]

@@ -9,7 +9,7 @@ import torch
 from omegaconf import MISSING, DictConfig
 from torch.utils.data import DataLoader
 
-from most.assembly import load_trained
+from most.assembly import check_taxonomy, load_trained
 from most.config import conf_dir, register, store_root, typed
 from most.datasets.dataset import WindowDataset
 from most.entry import run, start
@@ -50,6 +50,7 @@ def predict(config: PredictConfig) -> None:
     trained = load_trained(checkpoint)
     predictor = replace(trained.predictor, membership=Nearest()) if config.nearest else trained.predictor
     reader = dataset.reader()
+    check_taxonomy(trained.taxonomy, reader.taxonomy)
     frames = reader.frames(config.split)
     claim_folder(out, checkpoint, reader, config.split, "nearest" if config.nearest else "trained")
     frames = unfinished(reader, frames, out)

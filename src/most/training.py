@@ -79,7 +79,7 @@ def _notes(config: Config, stage: str, parts: dict[str, Any], reader: Reader) ->
     """Return what a stage's checkpoints say of themselves."""
     return {
         "most": describe(parts, reader.taxonomy, config.dataset.sweeps),
-        "most_run": describe_run(config, stage, len(reader.frames("train"))),
+        "most_run": describe_run(config, stage, reader.frames("train")),
     }
 
 

@@ -120,6 +120,11 @@ def test_dangling_token(root: Path, change: Callable, table: str, token: str, as
         (changed("ego_pose", 2, translation=[1, 2, math.nan]), "translation: expected finite numbers"),
         (changed("calibrated_sensor", 0, translation=[1, 2, "a"]), "row 'lidar-mounted': translation: .*3 numbers"),
         (changed("sample_annotation", 1, size=[1, 2]), f"row 'box-{SCENE}-2': size: expected 3 numbers"),
+        (changed("sample_data", LIDAR_2, filename="../a.bin"), "filename: expected a name inside .*, found '../a.bin'"),
+        (changed("sample_data", LIDAR_2, filename="/a.bin"), "filename: expected a name inside .*, found '/a.bin'"),
+        (changed("sample_data", LIDAR_2, token="../a"), "token: expected a name inside .*, found '../a'"),
+        (changed("sample_data", LIDAR_2, token="a/b"), "token: expected a name inside .*, found 'a/b'"),
+        (changed("panoptic", 0, filename="a/../../b"), "filename: expected a name inside .*, found 'a/../../b'"),
     ],
 )
 def test_rows_that_make_no_sense(root: Path, change: Callable, message: str) -> None:
@@ -137,6 +142,7 @@ def test_rows_that_make_no_sense(root: Path, change: Callable, message: str) -> 
         (None, "expected a table of nuScenes, found no file; copy"),
         (b'[{"token": "a"', "expected JSON, found something else .* cut off"),
         (b"\xff\xfe", "expected JSON, found something else"),
+        (b"[" * 100_000, "expected JSON, found something else"),
         (b"7", "expected a list of rows"),
         (b"[7]", "expected a list of rows"),
     ],
@@ -167,6 +173,7 @@ def cut(size: int) -> Callable[[Path], object]:
         (LABELS, Path.unlink, "expected panoptic labels, found no file"),
         (LABELS, cut(80), "expected an archive with the array data, found something else"),
         (LABELS, cut(0), "expected an archive with the array data, found something else"),
+        (LABELS, lambda path: np.save(path.open("wb"), np.zeros(8)), "expected an archive with the array data"),
         (LABELS, archive(labels=np.zeros(8, np.uint16)), "expected an archive with the array data"),
         (LABELS, archive(data=np.zeros(8, np.int64)), r"expected data of uint16, .* found int64 of shape \(8,\)"),
         (LABELS, archive(data=np.zeros((8, 1), np.uint16)), r".*found uint16 of shape \(8, 1\)"),

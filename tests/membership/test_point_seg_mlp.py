@@ -77,7 +77,7 @@ class Knowing(Predictor):
 
 
 def test_no_weight_or_statistic_of_stage_1_changes() -> None:
-    made, sample = stage(mixing=Mixing(scans=2, steps=3)), touching_cars()
+    made, sample = stage(mixing=Mixing(scans=8, steps=3)), touching_cars()
     made.predictor = Knowing(**vars(made.predictor))
     before, mlp = (
         {key: value.clone() for key, value in part.state_dict().items()} for part in (made.network, made.membership)

@@ -5,6 +5,7 @@ import torch
 
 from most.errors import ConfigError
 from most.membership import LabelledPairs, Mixing, PairPool
+from most.stages.membership import MembershipTraining
 
 
 def scan(number: int, pairs: int = 4) -> LabelledPairs:
@@ -73,3 +74,8 @@ def test_scans_without_pairs_are_no_error():
 def test_impossible_numbers_are_refused(name: str):
     with pytest.raises(ConfigError, match=rf"stage\.membership\.mixing\.{name}: expected at least"):
         Mixing(**{name: -1})
+
+
+def test_a_pool_smaller_than_a_batch_would_drop_scans_unseen():
+    with pytest.raises(ConfigError, match=r"mixing\.scans: expected 0, or at least .* = 8, found 4"):
+        MembershipTraining(batch_size=8, mixing=Mixing(scans=4))

@@ -33,7 +33,8 @@ class InstanceTables:
 
     def _load_or_build(self, sequence: str) -> InstanceTable:
         frames, taxonomy = self.reader.key_frames(sequence), self.reader.taxonomy
-        made_from = fingerprint(*self.reader.sources(sequence), asdict(taxonomy))
+        meaning = {key: value for key, value in asdict(taxonomy).items() if key != "min_points"}  # that is for scoring
+        made_from = fingerprint(*self.reader.sources(sequence), meaning)
         rules = LabelRules(taxonomy.to_training, taxonomy.is_thing, taxonomy.instance_of, self.reader.max_gap)
         path = self.folder / self._tree() / f"{sequence}.npz"
         return cached_table(path, made_from, map(self.reader.sweep, frames), len(frames), rules)

@@ -16,6 +16,8 @@ from most.errors import ConfigError
 from most.processes import everyones, processes, rank
 from most.structures import OnDevice
 
+ADDING, DRAWING = 1, 2  # random choices of their own
+
 
 @dataclass
 class Mixing:
@@ -54,6 +56,9 @@ class LabelledPairs(OnDevice):
         return cls(torch.cat([part.described for part in parts]), torch.cat([part.members for part in parts]))
 
 
+NONE = LabelledPairs(torch.zeros(0, 0), torch.zeros(0))
+
+
 class PairPool:
     """Holds the same scans' pairs in every process, on the CPU and in half precision.
 
@@ -63,24 +68,25 @@ class PairPool:
     def __init__(self, mixing: Mixing, seed: int) -> None:
         self.mixing, self.seed = mixing, seed
         self.scans: list[LabelledPairs] = []
+        self.pairs = NONE  # of all of them
         self.added = self.drawn = 0
 
     def add(self, scans: list[LabelledPairs]) -> None:
         """Keep some pairs of each of this process' scans, and what the others add at the same time."""
         mine = []
         for scan in scans:
-            chosen = self._choose(len(scan), self.mixing.pairs_per_scan, self.added, rank())
+            chosen = self._choose(len(scan), self.mixing.pairs_per_scan, ADDING, self.added, rank())
             some = scan.select(chosen.to(scan.members.device)).to("cpu")
             mine.append(LabelledPairs(some.described.half(), some.members))
             self.added += 1
         self.scans = [*self.scans, *everyones(mine)][-self.mixing.scans :]
+        self.pairs = LabelledPairs.cat(self.scans)
 
     def draw(self) -> LabelledPairs:
         """Return this process' share of the next step's pairs, on the CPU."""
-        pairs = LabelledPairs.cat(self.scans)
-        chosen = self._choose(len(pairs), self.mixing.pairs, self.drawn)[rank() :: processes()]
+        chosen = self._choose(len(self.pairs), self.mixing.pairs, DRAWING, self.drawn)[rank() :: processes()]
         self.drawn += 1
-        some = pairs.select(chosen)
+        some = self.pairs.select(chosen)
         return LabelledPairs(some.described.float(), some.members)
 
     def _choose(self, count: int, some: int, *turn: int) -> Tensor:
@@ -94,4 +100,5 @@ class PairPool:
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a state."""
         self.scans = [LabelledPairs(*scan) for scan in state["scans"]]
+        self.pairs = LabelledPairs.cat(self.scans) if self.scans else NONE
         self.added, self.drawn = state["added"], state["drawn"]

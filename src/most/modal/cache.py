@@ -21,7 +21,9 @@ from most.modal.outline import Outlines
 from most.structures import Sweep
 
 FORMAT = 1  # of the file and of the numbers in it: count up when either changes
-_UNREADABLE = (OSError, EOFError, ValueError, KeyError, NotImplementedError, zipfile.BadZipFile, zlib.error)
+_UNREADABLE = (  # all that numpy and zipfile stumble with over foreign bytes
+    OSError, EOFError, ValueError, KeyError, TypeError, RuntimeError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
 
 
 def fingerprint(files: Sequence[Path], contents: Sequence[Path], settings: Mapping[str, Any]) -> str:

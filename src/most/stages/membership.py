@@ -45,6 +45,11 @@ class MembershipTraining:
         for name in ("lr", "batch_size", "epochs"):
             if not getattr(self, name) > 0:
                 raise ConfigError(f"stage.membership.{name}: expected a positive number, found {getattr(self, name)}")
+        if 0 < self.mixing.scans < self.batch_size:
+            raise ConfigError(
+                f"stage.membership.mixing.scans: expected 0, or at least stage.membership.batch_size = "
+                f"{self.batch_size}, found {self.mixing.scans}"
+            )
         for name in ("momentum", "average"):
             if not 0 <= getattr(self, name) < 1:
                 raise ConfigError(f"stage.membership.{name}: expected a number in [0, 1), found {getattr(self, name)}")

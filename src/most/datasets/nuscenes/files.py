@@ -18,7 +18,9 @@ from most.files import atomic_write
 
 POINT = np.dtype(("<f4", 5))
 BRIGHTEST = 255.0
-_NO_ARCHIVE = (OSError, EOFError, ValueError, KeyError, NotImplementedError, zipfile.BadZipFile, zlib.error)
+_NO_ARCHIVE = (  # all that numpy and zipfile stumble with over foreign bytes
+    OSError, EOFError, ValueError, KeyError, TypeError, RuntimeError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
 
 
 def read_scan(path: Path, token: str) -> Float32[Tensor, "points 4"]:

@@ -15,7 +15,7 @@ from most.datasets.nuscenes.boxes import AmodalBoxes, Annotations
 from most.datasets.nuscenes.files import count_points, read_classes, read_panoptic, read_scan, write_panoptic
 from most.datasets.nuscenes.labels import LabelFiles
 from most.datasets.nuscenes.scenes import LidarSweep, Scenes
-from most.datasets.nuscenes.splits import VERSIONS, SceneSplits
+from most.datasets.nuscenes.splits import VERSIONS, SceneSplits, official_scenes
 from most.datasets.reader import Frame
 from most.datasets.settings import DatasetSettings
 from most.datasets.splits import check_split, present_sequences
@@ -161,7 +161,9 @@ class PanopticNuScenes:
 
     def official_split(self, frame: Frame) -> str:
         """What submissions call the split of a frame: val, test or train, with ``mini_`` before in the mini version."""
-        splits = [name for name in ("val", "test", "train") if frame.sequence in self.splits.scenes(self.version, name)]
+        names = ("val", "test", "train")
+        splits = [name for name in names if frame.sequence in official_scenes(self.version, name)]
+        splits += [name for name in names if frame.sequence in self.splits.scenes(self.version, name)]
         if not splits:
             raise DataError(f"{frame.sequence}: expected a scene of a split, found it in none of {self.version}")
         return f"mini_{splits[0]}" if self.version == "v1.0-mini" else splits[0]
@@ -192,7 +194,7 @@ class PanopticNuScenes:
 
     def _row(self, frame: Frame) -> LidarSweep:
         sweeps = self._sweeps(frame.sequence)
-        if frame.index >= len(sweeps):
+        if not 0 <= frame.index < len(sweeps):
             raise DataError(
                 f"{self.folder / 'sample_data.json'}: expected a sweep {frame.index} of {frame.sequence}, "
                 f"found {len(sweeps)} sweeps"

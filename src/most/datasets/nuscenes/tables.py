@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from most.errors import DataError
@@ -40,7 +40,7 @@ class Table:
         try:
             with self.path.open(encoding="utf-8") as file:
                 rows = json.load(file, object_hook=lambda row: self._checked(row) if keep(row) else None)
-        except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        except (ValueError, RecursionError) as error:
             raise DataError(
                 f"{self.path}: expected JSON, found something else ({error}); the table is cut off: copy it again"
             ) from error
@@ -55,4 +55,15 @@ class Table:
                     f"{self.path}: row {row.get('token')!r}: {name}: expected {kind.__name__}, "
                     f"found {row.get(name)!r}; copy the table again"
                 )
+        for name in {"token", "sample_data_token", "filename"} & self._columns.keys():
+            self._check_place(row, name)
         return {name: row[name] for name in self._columns}
+
+    def _check_place(self, row: Row, name: str) -> None:
+        """Raise a DataError where an entry that becomes the name of a file would lead out of its folder."""
+        parts = PurePosixPath(row[name]).parts
+        if row[name].startswith("/") or ".." in parts or "\\" in row[name] or (name != "filename" and len(parts) > 1):
+            raise DataError(
+                f"{self.path}: row {row['token']!r}: {name}: expected a name inside the dataset, found {row[name]!r}; "
+                "do not use this tree: copy the official one"
+            )
