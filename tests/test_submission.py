@@ -59,7 +59,7 @@ def test_a_package_holds_every_scan_of_the_split_and_the_same_bytes_every_time(
 ) -> None:
     frames = reader.frames("test")
     for name in ("a.zip", "b.zip"):
-        write_submission(reader, frames, folder, tmp_path / name, progress=False)
+        write_submission(reader, "test", folder, tmp_path / name, progress=False)
     assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
     with zipfile.ZipFile(tmp_path / "a.zip") as archive:
         assert archive.testzip() is None
@@ -75,7 +75,7 @@ def test_names_are_those_that_the_servers_expect(tmp_path: Path) -> None:
         frames = reader.frames("test")
         for frame in frames:
             predict(reader, frame, folder)
-        write_submission(reader, frames, folder, tmp_path / f"{make.__name__}.zip", progress=False)
+        write_submission(reader, "test", folder, tmp_path / f"{make.__name__}.zip", progress=False)
         with zipfile.ZipFile(tmp_path / f"{make.__name__}.zip") as archive:
             names = archive.namelist()
             assert sum(name.startswith(pattern) for name in names) == len(frames)
@@ -97,7 +97,7 @@ def test_everything_that_is_wrong_is_listed_and_nothing_is_written(
         reader, second, folder, [0, 0, taxonomy.things[0], taxonomy.things[0], taxonomy.stuff[0]], [0, 0, 0, 1, 7]
     )
     with pytest.raises(DataError) as refused:
-        write_submission(reader, reader.frames("test"), folder, tmp_path / "a.zip", progress=False)
+        write_submission(reader, "test", folder, tmp_path / "a.zip", progress=False)
     lines = str(refused.value).splitlines()
     assert lines[0].startswith(f"{missing}: expected")
     assert lines[1:4] == [
@@ -116,7 +116,7 @@ def test_a_scan_of_another_length_and_a_file_too_many_are_named(reader: Reader, 
     stray = path.with_name(f"stray{path.suffix}")
     stray.write_bytes(b"")
     with pytest.raises(DataError) as refused:
-        write_submission(reader, reader.frames("test"), folder, tmp_path / "a.zip", progress=False)
+        write_submission(reader, "test", folder, tmp_path / "a.zip", progress=False)
     assert f"{path}: expected a label for each of the scan's {points} points, found {points - 1}" in str(refused.value)
     assert f"{stray}: expected the predictions of the split's scans alone" in str(refused.value)
 
@@ -125,10 +125,16 @@ def test_a_file_that_is_cut_off_is_named_beside_the_others(reader: Reader, folde
     path = reader.prediction_path(folder, reader.frames("test")[0])
     path.write_bytes(path.read_bytes()[:-1])
     with pytest.raises(DataError, match=str(path)) as refused:
-        write_submission(reader, reader.frames("test"), folder, tmp_path / "a.zip", progress=False)
+        write_submission(reader, "test", folder, tmp_path / "a.zip", progress=False)
     assert "found the 1 problem(s) above" in str(refused.value)
 
 
-def test_a_split_without_scans_is_no_submission(reader: Reader, folder: Path, tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="expected scans to submit, found none"):
-        write_submission(reader, [], folder, tmp_path / "a.zip", progress=False)
+def test_a_split_that_is_not_all_there_is_no_submission(reader: Reader, folder: Path, tmp_path: Path) -> None:
+    name = "12" if isinstance(reader, SemanticKITTI) else "scene-0078"
+    reader.splits.test.append(name)
+    with (
+        pytest.warns(UserWarning),
+        pytest.raises(DataError, match=f"of the split test, found no {name};"),
+    ):
+        write_submission(reader, "test", folder, tmp_path / "a.zip", progress=False)
+    assert not (tmp_path / "a.zip").exists()

@@ -16,17 +16,22 @@ from most.files import atomic_write, is_partial
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the date of every file in an archive: the same predictions give the same bytes
 
 
-def write_submission(reader: Reader, frames: Sequence[Frame], folder: Path, out: Path, progress: bool = True) -> None:
-    """Check the predictions of ``frames`` in ``folder`` and write them to the archive ``out``.
+def write_submission(reader: Reader, split: str, folder: Path, out: Path, progress: bool = True) -> None:
+    """Check the predictions of a split in ``folder`` and write them to the archive ``out``.
 
     A DataError lists all that is wrong, not the first of it; nothing is written then.
     """
-    if not frames:
-        raise DataError(f"{folder}: expected scans to submit, found none in the split")
+    there = set(reader.sequences(split))
+    if missing := [name for name in reader.split_sequences(split) if name not in there]:
+        raise DataError(
+            f"{reader.root}: expected all sequences of the split {split}, found no {', '.join(missing)}; "
+            f"add them, or say which there are: dataset.splits.{split}=[...]"
+        )
+    frames = reader.frames(split)
     if wrong := list(find_problems(reader, frames, folder, progress)):
         listed = "\n".join(wrong)
         raise DataError(f"{listed}\n{folder}: expected a valid submission, found the {len(wrong)} problem(s) above")
-    notes = reader.submission_notes(list(frames))
+    notes = reader.submission_notes(frames)
     with atomic_write(out) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in notes.items():
             archive.writestr(_entry(name), content)

@@ -29,7 +29,7 @@ store_root("submit", SubmitConfig)
 def submit(config: SubmitConfig) -> None:
     """Check every scan's prediction, then write the archive ``out``; the scans are needed, to count their points."""
     reader, out = config.dataset.reader(), Path(config.out)
-    write_submission(reader, reader.frames(config.split), Path(config.predictions), out)
+    write_submission(reader, config.split, Path(config.predictions), out)
     print(f"{out}: ready to be uploaded")
 
 

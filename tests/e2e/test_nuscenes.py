@@ -8,6 +8,7 @@ import pytest
 
 from commands import TINY, most
 
+SCENES = {"val": "scene-0003", "test": "scene-0077"}
 SIMULATE = [
     "simulation=nuscenes", "out=nuscenes", "simulation.sequences=[scene-0001,scene-0003,scene-0077]",
     "simulation.scans=11", "simulation.sensor.columns=128",
@@ -45,7 +46,13 @@ def test_predictions_are_scored_with_the_devkits_figures(folder: Path) -> None:
 
 @pytest.mark.parametrize(("split", "version"), [("val", "v1.0-trainval"), ("test", "v1.0-test")])
 def test_predictions_are_packaged_as_the_server_expects(folder: Path, split: str, version: str) -> None:
-    told = [f"predictions={split}", f"split={split}", f"dataset.version={version}", f"out={split}.zip"]
+    told = [
+        f"predictions={split}",
+        f"split={split}",
+        f"dataset.splits.{split}=[{SCENES[split]}]",
+        f"dataset.version={version}",
+        f"out={split}.zip",
+    ]
     done = most(folder, "submit", *TREE, *told)
     assert done.returncode == 0, done.stderr
     with zipfile.ZipFile(folder / f"{split}.zip") as archive:
@@ -55,7 +62,8 @@ def test_predictions_are_packaged_as_the_server_expects(folder: Path, split: str
 
 
 def test_a_package_with_a_scan_missing_is_refused_by_name(folder: Path, tmp_path: Path) -> None:
-    done = most(folder, "submit", *TREE, f"predictions={tmp_path}", "split=val", "out=none.zip")
+    done = most(folder, "submit", *TREE, f"predictions={tmp_path}", "split=val", "out=none.zip",
+                "dataset.splits.val=[scene-0003]")  # fmt: skip
     assert done.returncode == 2
     assert done.stderr.count("expected panoptic labels, found no file") == 2
     assert "Traceback" not in done.stderr

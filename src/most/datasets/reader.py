@@ -36,6 +36,10 @@ class Reader(Protocol):
         """The split's sequences that are on disk."""
         ...
 
+    def split_sequences(self, split: str) -> list[str]:
+        """All of the split's sequences, on disk or not."""
+        ...
+
     def frames(self, split: str) -> list[Frame]:
         """The key frames of a split, by sequence and number: what is trained on, predicted and scored."""
         ...

@@ -67,10 +67,15 @@ class SemanticKITTI:
         """The folder of one sequence."""
         return self.root / "sequences" / sequence
 
+    def split_sequences(self, split: str) -> list[str]:
+        """All of the split's sequences, on disk or not."""
+        check_split(split)
+        names: list[str] = getattr(self.splits, split)
+        return names
+
     def sequences(self, split: str) -> list[str]:
         """The split's sequences that are on disk: warns about missing ones, raises a DataError when all are."""
-        check_split(split)
-        wanted = getattr(self.splits, split)
+        wanted = self.split_sequences(split)
         present = present_sequences(self.root, split, wanted, lambda name: self.folder(name).is_dir())
         if not present:
             raise DataError(self._explain_missing(split, wanted))

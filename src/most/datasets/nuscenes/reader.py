@@ -62,10 +62,14 @@ class PanopticNuScenes:
         self._lidarseg = LabelFiles(self.root, "lidarseg", self._scenes)
         self._poses: dict[str, Tensor] = {}
 
+    def split_sequences(self, split: str) -> list[str]:
+        """All of the split's scenes, on disk or not."""
+        check_split(split)
+        return self.splits.scenes(self.version, split)
+
     def sequences(self, split: str) -> list[str]:
         """The split's scenes that are on disk: warns about missing ones, raises a DataError when all are."""
-        check_split(split)
-        wanted = self.splits.scenes(self.version, split)
+        wanted = self.split_sequences(split)
         present = self._present(split, wanted)
         if not present:
             raise DataError(self._explain_missing(split, wanted))
