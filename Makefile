@@ -36,7 +36,7 @@ demo: setup
 
 # Real scans, where there are any: MOST_REAL_DATA=FOLDER make test (FOLDER holds semantickitti/sequences/NN).
 test: setup
-	OMP_NUM_THREADS=1 $(RUN) -m pytest -n 2 --jaxtyping-packages=most,shapes.checked
+	OMP_NUM_THREADS=1 $(RUN) -m pytest -n 2 --dist worksteal --jaxtyping-packages=most,shapes.checked
 
 lint: setup
 	$(RUN) -m ruff check .

@@ -133,7 +133,7 @@ def test_a_split_that_is_not_all_there_is_no_submission(reader: Reader, folder: 
     name = "12" if isinstance(reader, SemanticKITTI) else "scene-0078"
     reader.splits.test.append(name)
     with (
-        pytest.warns(UserWarning),
+        pytest.warns(UserWarning, match="are not there"),
         pytest.raises(DataError, match=f"of the split test, found no {name};"),
     ):
         write_submission(reader, "test", folder, tmp_path / "a.zip", progress=False)
