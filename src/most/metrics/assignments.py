@@ -1,4 +1,4 @@
-"""``sequences/NN/detections/NNNNNN.npz``: what stands behind a prediction, kept beside it for the membership accuracy.
+"""``detections/NAME.npz`` beside the folder of a prediction: what stands behind it, kept for the membership accuracy.
 
 Arrays: ``classes scores centres extents velocities roi`` with a row for each detection, in the sensor frame (m), and
 ``assigned`` (int32, a number for each point): the detection that claims the point, -1 for none.
@@ -31,7 +31,7 @@ class Assignments:
 
 
 def assignments_path(prediction: Path) -> Path:
-    """Where the assignments lie of a prediction in ``sequences/NN/predictions``."""
+    """Where the assignments of a prediction lie: in the folder ``detections`` beside the prediction's own."""
     return prediction.parent.parent / "detections" / f"{prediction.stem}.npz"
 
 
