@@ -105,9 +105,11 @@ def test_prediction_path_is_the_official_one(reader: PanopticNuScenes, tmp_path:
     assert reader.prediction_path("out", Frame("scene-0077", 0)).parent.name == "test"
     mini = PanopticNuScenes(write_tree(tmp_path / "mini", {"scene-0103": True}, version="v1.0-mini"), "v1.0-mini")
     assert mini.prediction_path("out", Frame("scene-0103", 0)).parent.name == "mini_val"
-    lost = PanopticNuScenes(reader.root, splits=SceneSplits(val=[]))
-    with pytest.raises(DataError, match="scene-0003: expected a scene of a split"):
-        lost.prediction_path("out", Frame("scene-0003", 2))
+    moved = PanopticNuScenes(reader.root, splits=SceneSplits(train=["scene-0003"], val=[]))
+    assert moved.prediction_path("out", Frame("scene-0003", 2)).parent.name == "val"  # as the server knows it
+    ours = PanopticNuScenes(write_tree(tmp_path / "ours", {"scene-9999": True}))
+    with pytest.raises(DataError, match="scene-9999: expected a scene of a split"):
+        ours.prediction_path("out", Frame("scene-9999", 2))
 
 
 def test_labels_suffice_for_scoring(reader: PanopticNuScenes) -> None:
