@@ -22,10 +22,11 @@ COMPONENTS = {
     "detections": {"voxels"},
     "membership": {"voxels", "normed_linear"},
     "panoptic": {"membership"},
+    "tracking": set(),
     "metrics": {"membership"},
     "simulation": {"datasets"},
 }
-ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw", "submit"}
+ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw", "submit", "track"}
 OUTER = {"entry", "config", "assembly", "training", "checks"}
 
 
