@@ -187,11 +187,12 @@ def test_a_range_of_scans_is_chosen_and_those_without_a_prediction_are_told_of(t
 def test_points_that_are_not_finite_are_not_shown(tree):
     path = tree / "tree" / "sequences" / "08" / "velodyne" / "000000.bin"
     points = np.fromfile(path, "<f4").reshape(-1, 4)
-    points[0, 0] = np.nan
+    points[[0, 6], 0] = np.nan  # one of the car's, one of the road's
     points.tofile(path)
     shown = recorded(tree)
     assert len(shown("prediction/sensor/things", 0)["positions"]) == 4
     assert len(shown("prediction/sensor/tracks", 0)["colors"]) == 4
+    assert len(shown("prediction/sensor/stuff", 0)["positions"]) == 2
 
 
 def test_nothing_to_show_is_refused(tree):

@@ -1,8 +1,8 @@
 """A rerun recording of a sequence: what the viewer shows, and how it is laid out. Needs the extra ``viz``.
 
 The trees ``prediction`` and ``truth`` are alike. Their root is the world; ``sensor`` below it has the sensor's pose,
-and in its frame lie ``stuff`` and ``things`` (points by class), ``tracks`` (the things again, by identity), ``boxes``, and
-``velocities`` (an arrow is a second of motion). Timelines: ``scan`` (number in the sequence), ``time``.
+and in its frame lie ``stuff`` and ``things`` (points by class), ``tracks`` (the things again, by identity), ``boxes``
+and ``velocities`` (an arrow is a second of motion). Timelines: ``scan`` (number in the sequence), ``time``.
 """
 
 from pathlib import Path
