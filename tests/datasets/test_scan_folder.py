@@ -176,6 +176,17 @@ def test_an_empty_scan_is_a_scan(tmp_path, name):
     assert scan.points.shape == (0, 4)
 
 
+@pytest.mark.parametrize("name", ["c.ply", "b.pcd"])
+def test_a_scan_may_be_a_single_point(tmp_path, name):
+    path = write(tmp_path / name)
+    text = (
+        path.read_text().replace("vertex 3", "vertex 1").replace("WIDTH 3", "WIDTH 1").replace("POINTS 3", "POINTS 1")
+    )
+    path.write_text("".join(text.splitlines(keepends=True)[:-2]))
+    (scan,) = folder_of(tmp_path)
+    assert scan.points.tolist() == [[1.5, -2, 0.25, 0.5]]
+
+
 def test_poses_and_times_stand_row_by_row_beside_the_scans(tmp_path):
     for name in ("0.bin", "1.bin"):
         write_bin(tmp_path / name)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from commands import most
+from commands import Forked, most
 from most.datasets.reader import Frame
 from most.datasets.semantickitti import SemanticKITTI, SemanticKITTISettings, Splits
 from most.errors import ConfigError, DataError
@@ -63,13 +63,13 @@ def write_labels_only(folder: Path, reader: SemanticKITTI, scans: range, name: s
 
 
 def write_detections(folder: Path, reader: SemanticKITTI, index: int) -> None:
-    """One detection of the moving car, which claims its four points, and one that claims none."""
+    """One detection of the moving car, which claims its points and one of the other's, and one that claims none."""
     found = Detections(
         torch.tensor([1, 6]), torch.tensor([0.9, 0.3]), torch.tensor([[5.0, 1, 0], [9, 9, 0]]),
         torch.tensor([[2.0, 1, 0.5], [0.5, 0.5, 1]]), torch.tensor([[0.0, 3], [0.1, 0]]),
     )  # fmt: skip
     claims = torch.full((len(world_points(index)[0]),), -1)
-    claims[:4] = 0
+    claims[:5] = 0
     path = assignments_path(reader.prediction_path(folder, Frame("08", index)))
     write_assignments(path, Assignments(found, torch.ones(2, 3), claims))
 
@@ -242,6 +242,15 @@ def test_the_command_writes_a_recording(tree):
     done = most(tree, "view", "predictions=predictions", "sequence='08'", "last=0", "out=a.rrd", "dataset.root=tree")
     assert done.returncode == 0, done.stderr
     assert Shown(tree / "a.rrd").seconds == {0: 0.0}
+
+
+def test_a_recording_that_a_full_disk_cuts_off_is_refused_and_goes(tree):
+    needs_rerun()
+    arguments = ["predictions=predictions", "sequence='08'", "out=new/a.rrd", "dataset.root=tree"]
+    done = Forked(tree, "view", *arguments, largest_file=10_000).done()
+    assert done.returncode == 2
+    assert "expected room for a whole recording, found it cut off" in done.stderr
+    assert list((tree / "new").iterdir()) == []
 
 
 def test_new_identities_take_the_preferred_number_unless_it_is_taken():

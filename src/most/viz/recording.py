@@ -14,6 +14,7 @@ import torch
 from jaxtyping import Float, Float64, Int64
 from torch import Tensor
 
+from most.errors import DataError
 from most.structures import Panoptic
 from most.viz.classes import ClassStyle
 from most.viz.identities import Identities
@@ -23,12 +24,12 @@ PROMINENT = rr.Radius.ui_points(2.5)  # of points of things
 
 
 class Recording:
-    """Writes to a file what is shown at each scan; ``close`` ends it."""
+    """Writes to a file what is shown at each scan; ``close`` ends it, ``check_whole`` then looks for the end."""
 
     def __init__(self, path: Path, name: str, style: ClassStyle, trees: list[str]) -> None:
         """``trees`` are shown side by side."""
         rr.set_strict_mode(True)  # else a mistake is a line in a log, and the file lacks what was meant
-        self.style = style
+        self.path, self.style = path, style
         self._stream = rr.RecordingStream("most")
         self._stream.set_log_tick_enabled(False)
         self._stream.set_log_time_enabled(False)
@@ -84,6 +85,16 @@ class Recording:
         """Write what is still held back, and the file's end."""
         self._stream.disconnect()
 
+    def check_whole(self) -> None:
+        """Raise a DataError for a file without its end: a full disk stops the library's writing, not the program."""
+        try:
+            rr.chunk.RrdReader(self.path).store()
+        except Exception as error:
+            raise DataError(
+                f"{self.path.parent}: expected room for a whole recording, found it cut off ({error}); make room, or choose "
+                "fewer scans: first=... last=..."
+            ) from error
+
     def _name(self, class_id: int, segment: int) -> str:
         return f"{self.style.names[class_id]} {segment & 0xFFFFFFFF}" if segment else self.style.names[class_id]
 
@@ -104,7 +115,7 @@ def layout(trees: list[str]) -> rrb.Blueprint:
         rrb.Horizontal(*(_view(tree, f"{tree} {name}", hidden) for tree in trees), name=name)
         for name, hidden in tabs.items()
     ]
-    return rrb.Blueprint(rrb.Tabs(*shown), rrb.TimePanel(state="expanded", timeline="scan"), collapse_panels=True)
+    return rrb.Blueprint(rrb.Tabs(*shown), rrb.TimePanel(state="expanded", timeline="time"), collapse_panels=True)
 
 
 def _view(tree: str, name: str, hidden: str) -> rrb.Spatial3DView:

@@ -45,6 +45,7 @@ def write_scene(path: Path, reader: Reader, frames: list[Frame], folder: Path) -
         _Scene(recording, reader, folder).write(frames)
     finally:
         recording.close()
+    recording.check_whole()
 
 
 class _Scene:
