@@ -86,7 +86,7 @@ def _read_pcd(path: Path) -> Num[np.ndarray, "points columns"]:
         raise ConfigError(f"{path}: reading .pcd files takes an extra: pip install 'most-lidar[pcd]'") from error
     with path.open("rb") as file:
         cloud = _parse(path, "PCD", file, PointCloud.from_fileobj)
-    rows = np.atleast_1d(cloud.pc_data)
+    rows = cloud.pc_data  # a record, not an array of one, where an ASCII file has a single point
     return _columns(path, {name: rows[name] for name in rows.dtype.names or ()}, cloud.metadata.points)
 
 

@@ -91,8 +91,8 @@ class Recording:
             rr.chunk.RrdReader(self.path).store()
         except Exception as error:
             raise DataError(
-                f"{self.path.parent}: expected room for a whole recording, found it cut off ({error}); make room, or choose "
-                "fewer scans: first=... last=..."
+                f"{self.path.parent}: expected room for a whole recording, found it cut off ({error}); make "
+                "room, or choose fewer scans: first=... last=..."
             ) from error
 
     def _name(self, class_id: int, segment: int) -> str:
