@@ -25,7 +25,7 @@ COMPONENTS = {
     "metrics": {"membership"},
     "simulation": {"datasets"},
 }
-ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw", "submit"}
+ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw", "submit", "view"}
 OUTER = {"entry", "config", "assembly", "training", "checks"}
 
 
