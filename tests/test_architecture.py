@@ -22,10 +22,11 @@ COMPONENTS = {
     "detections": {"voxels"},
     "membership": {"voxels", "normed_linear"},
     "panoptic": {"membership"},
+    "tracking": set(),
     "metrics": {"membership"},
     "simulation": {"datasets"},
 }
-ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw", "submit", "view"}
+ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw", "submit", "track", "view"}
 OUTER = {"entry", "config", "assembly", "training", "checks"}
 
 

@@ -27,6 +27,7 @@ from most.membership import Nearest, PointSegMLPSettings
 from most.modal.extent import ShrinkWrap, TrackMax
 from most.stages.settings import StageSettings
 from most.stages.trainer import TrainerSettings
+from most.tracking import TrackerSettings
 from most.voxels import Grid
 
 COMPONENTS: dict[str, dict[str, type]] = {
@@ -47,6 +48,7 @@ COMPONENTS: dict[str, dict[str, type]] = {
     "centre_head": {"centre_head": CentreHead},
     "semantic_head": {"semantic_head": SemanticHead},
     "inference": {"inference": Inference},
+    "tracker": {"tracker": TrackerSettings},
 }
 
 

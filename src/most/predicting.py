@@ -1,16 +1,14 @@
 """Writing predictions: the official label files, and the detections beside them."""
 
 import hashlib
-import json
 from collections.abc import Iterable
 from pathlib import Path
 
 import torch
 from tqdm import tqdm
 
+from most.claims import claim
 from most.datasets.reader import Frame, Reader
-from most.errors import DataError
-from most.files import atomic_write, is_partial
 from most.inference import Prediction, Predictor
 from most.metrics.assignments import Assignments, assignments_path, read_assignments, write_assignments
 from most.structures import Panoptic, Sample
@@ -20,26 +18,14 @@ RECORD = "prediction.json"
 
 def claim_folder(out: Path, checkpoint: Path, reader: Reader, split: str, membership: str) -> None:
     """Note in ``out`` what is written there; another model's or dataset's are not mixed in, the same one's go on."""
-    claim = {
+    content = {
         "checkpoint_sha256": hashlib.sha256(checkpoint.read_bytes()).hexdigest(),
         "dataset": str(Path(reader.root).resolve()),
         "split": split,
         "membership": membership,
         "sequences": reader.sequences(split),
     }
-    path, record = out / RECORD, json.dumps(claim)
-    if out.exists() and not out.is_dir():
-        raise DataError(f"{out}: expected a new or empty folder, found a file; choose another out")
-    if not path.is_file():
-        if out.is_dir() and any(not is_partial(path) for path in out.iterdir()):
-            raise DataError(f"{out}: expected a new or empty folder, found other files; choose another out")
-        with atomic_write(path, "w") as file:
-            file.write(record)
-    elif path.read_bytes() != record.encode():  # whatever it holds, it need not be JSON
-        raise DataError(
-            f"{out}: holds predictions of another checkpoint, membership, dataset or split; choose another out, "
-            "or remove it"
-        )
+    claim(out, RECORD, content, "predictions of another checkpoint, membership, dataset or split")
 
 
 def unfinished(reader: Reader, frames: list[Frame], out: Path) -> list[Frame]:

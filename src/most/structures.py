@@ -1,4 +1,4 @@
-"""The words every stage speaks: Sweep, Instances, Sample, Voxels, BevMaps, Detections, Panoptic.
+"""The words every stage speaks: Sweep, Instances, Sample, Voxels, BevMaps, Detections, Panoptic, Observations, Tracks.
 
 Frames: *sensor* is the current sweep's lidar frame as its dataset has it, in metres with z up (SemanticKITTI's x points
 forward and y left, nuScenes' x right and y forward); *world* is the frame of a sequence's poses; *grid* counts voxels
@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
 Structure = TypeVar("Structure", bound="OnDevice")
+Table = TypeVar("Table", bound="Rows")
 
 
 class OnDevice:
@@ -30,6 +31,22 @@ class OnDevice:
         return replace(self, **moved)  # type: ignore[type-var]
 
 
+class Rows(OnDevice):
+    """A dataclass of tensors that all have a row for each item."""
+
+    def __len__(self) -> int:
+        return len(next(iter(vars(self).values())))
+
+    def select(self: Table, keep: Tensor) -> Table:
+        """Keep the rows that a boolean mask or an index names."""
+        return type(self)(**{name: value[keep] for name, value in vars(self).items()})
+
+    @classmethod
+    def cat(cls: type[Table], parts: list[Table]) -> Table:
+        """Put several tables under one another."""
+        return cls(**{name: torch.cat([getattr(part, name) for part in parts]) for name in vars(parts[0])})
+
+
 @dataclass
 class Sweep(OnDevice):
     """One revolution of the lidar, as it lies on disk."""
@@ -43,7 +60,7 @@ class Sweep(OnDevice):
 
 
 @dataclass
-class Instances(OnDevice):
+class Instances(Rows):
     """The thing instances visible in one sweep, in its sensor frame (paper, section III, modal recognition)."""
 
     keys: Int64[Tensor, "instances"]  # raw label: unique within the sweep
@@ -53,19 +70,6 @@ class Instances(OnDevice):
     extents: Float[Tensor, "instances 3"]  # half-sizes about the centre along the axes, m, by the extent strategy
     velocities: Float[Tensor, "instances 2"]  # of the centre relative to the ground, turned into the axes here, m/s
     velocity_known: Bool[Tensor, "instances"]
-
-    def __len__(self) -> int:
-        return len(self.keys)
-
-    def select(self, keep: Tensor) -> "Instances":
-        """Keep the instances a boolean mask or an index names."""
-        return Instances(**{field.name: getattr(self, field.name)[keep] for field in fields(self)})
-
-    @staticmethod
-    def cat(parts: "list[Instances]") -> "Instances":
-        """The instances of several sweeps, one after the other."""
-        names = [field.name for field in fields(Instances)]
-        return Instances(**{name: torch.cat([getattr(part, name) for part in parts]) for name in names})
 
 
 @dataclass
@@ -107,7 +111,7 @@ class BevMaps(OnDevice):
 
 
 @dataclass
-class Detections(OnDevice):
+class Detections(Rows):
     """Modal centres detected in one sweep, most confident first, in its sensor frame."""
 
     classes: Int64[Tensor, "detections"]
@@ -116,13 +120,6 @@ class Detections(OnDevice):
     extents: Float[Tensor, "detections 3"]  # half-sizes, m
     velocities: Float[Tensor, "detections 2"]  # m/s
 
-    def __len__(self) -> int:
-        return len(self.scores)
-
-    def select(self, keep: Tensor) -> "Detections":
-        """Keep the detections a boolean mask or an index names."""
-        return Detections(**{field.name: getattr(self, field.name)[keep] for field in fields(self)})
-
 
 @dataclass
 class Panoptic(OnDevice):
@@ -130,3 +127,29 @@ class Panoptic(OnDevice):
 
     semantics: Int64[Tensor, "points"]
     ids: Int64[Tensor, "points"]  # from 1 for points of things, 0 for stuff; detection i of the sweep owns id i + 1
+
+
+@dataclass
+class Observations(Rows):
+    """The segments of things in one sweep, in its sensor frame: what a tracker is told."""
+
+    classes: Int64[Tensor, "segments"]
+    centres: Float[Tensor, "segments 3"]  # modal centre, m
+    extents: Float[Tensor, "segments 3"]  # half-sizes about the centre along the axes, m
+    velocities: Float[Tensor, "segments 2"]  # relative to the ground, along the axes here, m/s
+    velocity_known: Bool[Tensor, "segments"]
+    scores: Float[Tensor, "segments"]  # in [0, 1]
+
+
+@dataclass
+class Tracks(Rows):
+    """The objects that a tracker follows, the oldest first, in the sensor frame of the last sweep."""
+
+    ids: Int64[Tensor, "tracks"]
+    classes: Int64[Tensor, "tracks"]
+    centres: Float[Tensor, "tracks 3"]  # where each is, or, out of sight, is expected, m
+    extents: Float[Tensor, "tracks 3"]  # half-sizes as last seen, m
+    velocities: Float[Tensor, "tracks 2"]  # relative to the ground, along the axes here, m/s
+    hits: Int64[Tensor, "tracks"]  # sweeps that saw it
+    first_seen: Float[Tensor, "tracks"]  # float64, s, on the clock of the sweeps
+    last_seen: Float[Tensor, "tracks"]  # float64, s

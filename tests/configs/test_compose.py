@@ -10,7 +10,7 @@ from most.config import conf_dir, typed
 
 ROOTS = sorted(path.stem for path in conf_dir().glob("*.yaml"))
 OPTIONS = sorted((path.parent.name, path.stem) for path in conf_dir().glob("*/*.yaml"))
-OF_OTHER_ROOTS = {"simulation": "simulate"}
+OF_OTHER_ROOTS = {"simulation": "simulate", "tracker": "track"}
 REQUIRED = {
     "compare": ["reports={a: a.json}"],
     "draw": ["predictions=a", "sequence='08'"],
@@ -18,6 +18,7 @@ REQUIRED = {
     "evaluate": ["predictions=a"],
     "submit": ["predictions=a"],
     "view": ["predictions=a", "sequence='08'"],
+    "track": ["predictions=a", "out=b"],
 }
 
 
@@ -37,7 +38,8 @@ def test_every_command_composes(root):
 @pytest.mark.parametrize(("group", "option"), OPTIONS)
 def test_every_option_composes(group, option):
     sign = "+" if group == "experiment" else ""
-    typed(compose(OF_OTHER_ROOTS.get(group, "train"), [f"{sign}{group}={option}"]))
+    root = OF_OTHER_ROOTS.get(group, "train")
+    typed(compose(root, [*REQUIRED.get(root, []), f"{sign}{group}={option}"]))
 
 
 @pytest.mark.parametrize("path", sorted(conf_dir().rglob("*.yaml")), ids=lambda path: f"{path.parent.name}/{path.stem}")

@@ -160,7 +160,7 @@ def test_a_split_without_labels_is_refused(tree: Tree) -> None:
     with pytest.raises(DataError, match="labels"):
         tree.evaluate("08")
     reader = SemanticKITTI(tree.root, Splits(val=["08"]))
-    with pytest.raises(DataError, match="expected scans to score, found none"):
+    with pytest.raises(DataError, match="expected predictions of scans, found no scan"):
         evaluate_folder(reader, [], tree.predictions)
     write(tree.prediction("08", 0), [ROAD])
     with pytest.raises(DataError, match=r"labels/000000\.label"):

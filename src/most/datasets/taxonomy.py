@@ -4,6 +4,7 @@ A taxonomy is data: one YAML file beside this module, read by :meth:`Taxonomy.lo
 holds the dataset's own class id and the instance's number, as the taxonomy's :class:`LabelCode` says.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -26,7 +27,11 @@ ENTRIES = {
     "predicted_as": str,
     "classes": list,
 }
-CHOICES = {"label.high": ("class", "instance"), "predicted_as": ("raw", "training")}
+CHOICES = {
+    "label.high": ("class", "instance"),
+    "label.unique_in": ("class", "sequence"),
+    "predicted_as": ("raw", "training"),
+}
 
 
 @dataclass(frozen=True)
@@ -35,6 +40,7 @@ class LabelCode:
 
     high: str  # "class" or "instance": which of the two is multiplied
     step: int  # instance numbers are smaller; class ids too, where they are the low part
+    unique_in: str  # "class" or "sequence": what two tracks must share for their numbers to differ
 
     def class_of(self, label: Int64[Tensor, "*points"]) -> Int64[Tensor, "*points"]:
         """The class id in a label."""
@@ -64,6 +70,7 @@ class Taxonomy:
     raw_table_size: int  # raw class ids from here on are errors; unlisted ones below are void
     label: LabelCode
     predicted_as: str  # which id a submission holds: "raw", the first of the class's raw ids, or "training"
+    gates: list[float]  # m in half a second that a tracker may miss a thing of the class by; 0 where it is none
 
     @staticmethod
     def load(name: str) -> "Taxonomy":
@@ -89,8 +96,9 @@ class Taxonomy:
             min_points=content["min_points"],
             raw_ids=[entry["raw"] for entry in classes],
             raw_table_size=content["raw_table_size"],
-            label=LabelCode(content["label"]["high"], content["label"]["step"]),
+            label=LabelCode(*(content["label"][key] for key in ("high", "step", "unique_in"))),
             predicted_as=content["predicted_as"],
+            gates=[float(entry.get("gate", 0)) for entry in classes],
         )
 
     @property
@@ -185,10 +193,10 @@ def check_content(path: Path, content: Any) -> None:
     for key, kind in ENTRIES.items():
         if not isinstance(content.get(key), kind):
             raise DataError(f"{path}: {key}: expected {kind.__name__}, found {content.get(key)!r}")
-    found = {"label.high": content["label"].get("high"), "predicted_as": content["predicted_as"]}
+    found = content | {f"label.{key}": value for key, value in content["label"].items()}
     for key, choices in CHOICES.items():
-        if found[key] not in choices:
-            raise DataError(f"{path}: {key}: expected {' or '.join(choices)}, found {found[key]!r}")
+        if found.get(key) not in choices:
+            raise DataError(f"{path}: {key}: expected {' or '.join(choices)}, found {found.get(key)!r}")
     if not is_integers([step := content["label"].get("step")], 1 << 31) or step < 2:
         raise DataError(f"{path}: label.step: expected a number above 1, found {step!r}")
     taken: dict[int, str] = {}
@@ -202,14 +210,18 @@ def check_content(path: Path, content: Any) -> None:
 
 def check_class(where: str, index: int, entry: Any, table_size: int) -> None:
     """Raise a DataError unless ``entry`` describes one class; the first one, and no other, is void."""
-    if not isinstance(entry, dict) or set(entry) != {"name", "kind", "raw", "colour"}:
-        raise DataError(f"{where}: expected the keys name, kind, raw, colour, found {entry!r}")
+    keys = ["name", "kind", "raw", "colour"]
+    keys += ["gate"] if isinstance(entry, dict) and entry.get("kind") == "thing" else []
+    if not isinstance(entry, dict) or set(entry) != set(keys):
+        raise DataError(f"{where}: expected the keys {', '.join(keys)}, found {entry!r}")
     if entry["kind"] not in KINDS or (entry["kind"] == "void") != (index == 0):
         raise DataError(f"{where}.kind: expected {'void' if index == 0 else 'thing or stuff'}, found {entry['kind']!r}")
     if not is_integers(entry["raw"], table_size) or not entry["raw"]:
         raise DataError(f"{where}.raw: expected ids in 0..{table_size - 1}, found {entry['raw']!r}")
     if not is_integers(entry["colour"], 256) or len(entry["colour"]) != 3:
         raise DataError(f"{where}.colour: expected three numbers in 0..255, found {entry['colour']!r}")
+    if "gate" in entry and not (isinstance(entry["gate"], int | float) and 0 < entry["gate"] < math.inf):
+        raise DataError(f"{where}.gate: expected metres above 0, found {entry['gate']!r}")
 
 
 def is_integers(value: Any, end: int) -> bool:

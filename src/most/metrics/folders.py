@@ -30,7 +30,7 @@ def evaluate_folder(
     also holds detections and the dataset its scans. Raises DataError for predictions that are missing or do not fit
     the truth, and for a split without labels.
     """
-    paths = _prediction_paths(reader, frames, folder)
+    paths = prediction_paths(reader, frames, folder)
     scores = _Scores(reader, _has_assignments(reader, frames, paths))
     for frame, path in tqdm(
         zip(frames, paths, strict=True), "evaluate", len(frames), unit="scan", disable=not progress
@@ -74,10 +74,10 @@ class _Scores(Generic[Frame]):
         return {"panoptic": figures | classes} | self.sequences.report()
 
 
-def _prediction_paths(reader: TruthReader[Frame], frames: Sequence[Frame], folder: Path) -> list[Path]:
+def prediction_paths(reader: TruthReader[Frame], frames: Sequence[Frame], folder: Path) -> list[Path]:
     """Where the predictions lie; raises DataError unless all are there."""
     if not frames:
-        raise DataError(f"{folder}: expected scans to score, found none in the split")
+        raise DataError(f"{folder}: expected predictions of scans, found no scan in the split")
     paths = [reader.prediction_path(folder, frame) for frame in frames]
     if missing := [path for path in paths if not path.is_file()]:
         raise DataError(

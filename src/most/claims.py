@@ -1,0 +1,25 @@
+"""Folders that a command fills: what it writes there is not mixed with anything else, and it may go on."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from most.errors import DataError
+from most.files import atomic_write, is_partial
+
+
+def claim(out: Path, name: str, content: dict[str, Any], others: str) -> None:
+    """Note ``content`` in the file ``name`` of a new or empty folder; one that holds the same note is gone on with.
+
+    A folder that was claimed for something else is a DataError, which says that it holds ``others``.
+    """
+    path, record = out / name, json.dumps(content)
+    if out.exists() and not out.is_dir():
+        raise DataError(f"{out}: expected a new or empty folder, found a file; choose another out")
+    if not path.is_file():
+        if out.is_dir() and any(not is_partial(path) for path in out.iterdir()):
+            raise DataError(f"{out}: expected a new or empty folder, found other files; choose another out")
+        with atomic_write(path, "w") as file:
+            file.write(record)
+    elif path.read_bytes() != record.encode():  # whatever it holds, it need not be JSON
+        raise DataError(f"{out}: holds {others}; choose another out, or remove it")

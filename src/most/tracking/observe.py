@@ -1,0 +1,90 @@
+"""From the labels of one sweep to what a tracker is told of it, and back to its points."""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float, Int64
+from torch import Tensor
+
+from most.structures import Detections, Observations, OnDevice, Panoptic
+
+UNDETECTED = 0.0  # score of a segment that no detection claims: any detection chooses its track before it
+SMALLEST = 0.05  # half-size of a segment of one point, m
+
+
+@dataclass
+class Segments(OnDevice):
+    """The observed segments of one sweep, and where they are among its points."""
+
+    observations: Observations
+    rows: Int64[Tensor, "points"]  # the observation that each point belongs to, -1 for none
+
+    def rename(self, identities: Int64[Tensor, "segments"]) -> Int64[Tensor, "points"]:
+        """Return each point's track identity, 0 for points of no segment."""
+        return torch.cat([identities, identities.new_zeros(1)])[self.rows]
+
+
+def observe(
+    points: Float[Tensor, "points 3"],
+    panoptic: Panoptic,
+    things: list[int],
+    detections: Detections | None = None,
+    claimed: Int64[Tensor, "points"] | None = None,
+) -> Segments:
+    """Return the segments of things in one sweep: points of one class and one id other than 0, whatever the numbers.
+
+    ``detections`` and ``claimed`` (the detection whose member a point is, -1 for none) come together. The detection
+    that claims most of a segment's points lends it centre, extent, velocity and score. Where none does (clusters,
+    predictions of others) they come from the points: their mean, their reach, no velocity, and the lowest score.
+    Ids are not read for that: they are numbers of ``panoptic.fuse`` only until somebody renames them.
+    """
+    classes, rows = _segments(panoptic, things)
+    seen = _by_points(points, classes, rows)
+    if detections is not None and claimed is not None and len(detections) and len(seen):
+        seen = _by_detections(seen, rows, detections, claimed)
+    return Segments(seen, rows)
+
+
+def _segments(panoptic: Panoptic, things: list[int]) -> tuple[Int64[Tensor, "segments"], Int64[Tensor, "points"]]:
+    """Return each segment's class, and the segment of each point, -1 for none."""
+    semantics, ids = panoptic.semantics, panoptic.ids
+    own = torch.isin(semantics, torch.tensor(things, device=semantics.device)) & (ids != 0)
+    keys, row = torch.unique(torch.stack([semantics[own], ids[own]], 1), dim=0, return_inverse=True)
+    rows = torch.full_like(semantics, -1)
+    rows[own] = row
+    return keys[:, 0], rows
+
+
+def _by_points(
+    points: Float[Tensor, "points 3"], classes: Int64[Tensor, "segments"], rows: Int64[Tensor, "points"]
+) -> Observations:
+    """Observe segments by their finite points; one that has none is put at the sensor."""
+    own = (rows >= 0) & points.isfinite().all(1)
+    row, near, count = rows[own], points[own].double(), len(classes)
+    sizes = torch.bincount(row, minlength=count).clamp(min=1)
+    centres = near.new_zeros(count, 3).index_add_(0, row, near) / sizes[:, None]
+    reach = torch.full_like(centres, SMALLEST)
+    reach.scatter_reduce_(0, row[:, None].expand(-1, 3), (near - centres[row]).abs(), "amax")
+    return Observations(
+        classes=classes,
+        centres=centres.float(),
+        extents=reach.float(),
+        velocities=points.new_zeros(count, 2, dtype=torch.float32),
+        velocity_known=torch.zeros_like(classes, dtype=torch.bool),
+        scores=points.new_full((count,), UNDETECTED, dtype=torch.float32),
+    )
+
+
+def _by_detections(
+    seen: Observations, rows: Int64[Tensor, "points"], detections: Detections, claimed: Int64[Tensor, "points"]
+) -> Observations:
+    """Replace what points say of a segment by what the detection of its class says that claims most of them."""
+    both = (rows >= 0) & (claimed >= 0)
+    votes = torch.bincount(rows[both] * len(detections) + claimed[both], minlength=len(seen) * len(detections))
+    most, best = votes.reshape(len(seen), len(detections)).max(1)
+    found = ((most > 0) & (detections.classes[best] == seen.classes)).nonzero().squeeze(1)
+    lent = detections.select(best[found])
+    for name in ("centres", "extents", "velocities", "scores"):
+        setattr(seen, name, getattr(seen, name).index_copy(0, found, getattr(lent, name).float()))
+    seen.velocity_known = seen.velocity_known.index_fill(0, found, value=True)
+    return seen
