@@ -22,7 +22,7 @@ COMPONENTS = {
     "detections": {"voxels"},
     "membership": {"voxels", "normed_linear"},
     "panoptic": {"membership"},
-    "metrics": {"membership"},
+    "metrics": {"datasets", "membership"},
     "simulation": {"datasets"},
 }
 ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw", "submit"}

@@ -24,9 +24,14 @@ ENTRIES = {
     "raw_table_size": int,
     "label": dict,
     "predicted_as": str,
+    "evaluator": str,
     "classes": list,
 }
-CHOICES = {"label.high": ("class", "instance"), "predicted_as": ("raw", "training")}
+CHOICES = {
+    "label.high": ("class", "instance"),
+    "predicted_as": ("raw", "training"),
+    "evaluator": ("semantickitti", "nuscenes"),
+}
 
 
 @dataclass(frozen=True)
@@ -64,6 +69,7 @@ class Taxonomy:
     raw_table_size: int  # raw class ids from here on are errors; unlisted ones below are void
     label: LabelCode
     predicted_as: str  # which id a submission holds: "raw", the first of the class's raw ids, or "training"
+    evaluator: str  # whose 4D figures: "semantickitti" (LSTQ) or "nuscenes" (PAT, PTQ, TQ, and LSTQ in its version)
 
     @staticmethod
     def load(name: str) -> "Taxonomy":
@@ -91,6 +97,7 @@ class Taxonomy:
             raw_table_size=content["raw_table_size"],
             label=LabelCode(content["label"]["high"], content["label"]["step"]),
             predicted_as=content["predicted_as"],
+            evaluator=content["evaluator"],
         )
 
     @property
@@ -185,7 +192,7 @@ def check_content(path: Path, content: Any) -> None:
     for key, kind in ENTRIES.items():
         if not isinstance(content.get(key), kind):
             raise DataError(f"{path}: {key}: expected {kind.__name__}, found {content.get(key)!r}")
-    found = {"label.high": content["label"].get("high"), "predicted_as": content["predicted_as"]}
+    found = {"label.high": content["label"].get("high")} | {key: content[key] for key in ("predicted_as", "evaluator")}
     for key, choices in CHOICES.items():
         if found[key] not in choices:
             raise DataError(f"{path}: {key}: expected {' or '.join(choices)}, found {found[key]!r}")
