@@ -36,8 +36,8 @@ def evaluate(config: EvaluateConfig) -> None:
     write_report(Path(config.out), report)
     taxonomy = reader.taxonomy
     print(format_table(report["panoptic"], [taxonomy.class_names[thing] for thing in taxonomy.things]))
-    print("", *map(format_row, paper_rows(report)), sep="\n\n")
-    print("", *why_none(report), sep="\n")
+    for text in (*map(format_row, paper_rows(report)), *why_none(report)):
+        print(f"\n{text}")
 
 
 @hydra.main(version_base=None, config_path=str(conf_dir()), config_name="evaluate")
