@@ -23,7 +23,7 @@ COMPONENTS = {
     "membership": {"voxels", "normed_linear"},
     "panoptic": {"membership"},
     "tracking": set(),
-    "metrics": {"membership"},
+    "metrics": {"datasets", "membership"},
     "simulation": {"datasets"},
 }
 ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw", "submit", "track", "view"}

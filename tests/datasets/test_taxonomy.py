@@ -113,6 +113,7 @@ def test_every_taxonomy_file_holds_together(path: Path) -> None:
         ({"label": {"high": "class", "step": 9}}, "label.unique_in: expected class or sequence, found None"),
         ({"label": 1000}, "label: expected dict, found 1000"),
         ({"predicted_as": "colour"}, "predicted_as: expected raw or training, found 'colour'"),
+        ({"evaluator": "waymo"}, "evaluator: expected semantickitti or nuscenes, found 'waymo'"),
         ({"classes": [{"name": "void"}]}, r"classes\[0\]: expected the keys name, kind, raw, colour"),
         ({"kind": "stuff"}, r"classes\[0\]\.kind: expected void, found 'stuff'"),
         ({"raw": [9]}, r"classes\[0\]\.raw: expected ids in 0\.\.3, found \[9\]"),
@@ -128,7 +129,7 @@ def test_faulty_file_is_refused(tmp_path: Path, change: dict, message: str) -> N
     inner = {key: value for key, value in change.items() if key in void}
     label = {"high": "class", "step": 10, "unique_in": "class"}
     content = {"name": "toy", "min_points": 5, "raw_table_size": 4, "label": label, "predicted_as": "raw"}
-    content |= {"classes": [void | inner, car]} | top
+    content |= {"evaluator": "nuscenes", "classes": [void | inner, car]} | top
     path = tmp_path / "toy.yaml"
     path.write_text(yaml.safe_dump(content))
     with pytest.raises(DataError, match=f"toy.yaml: {message}"):
