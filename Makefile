@@ -2,11 +2,12 @@
 PYTHON ?= python3
 TORCH ?= torch==2.13.0# pinned first: left to pip, torch brings gigabytes of CUDA; for a GPU: make setup TORCH=torch
 VENV ?= .venv
+DEVKIT ?= .devkit
 DEMO ?= demo
 RUN = $(VENV)/bin/python
 READY = $(VENV)/.ready
 
-.PHONY: setup demo test lint bench clean
+.PHONY: setup devkit demo test lint bench clean
 
 setup: $(READY)
 
@@ -16,6 +17,14 @@ $(READY): pyproject.toml
 	$(RUN) -m pip install --quiet "$(TORCH)"
 	$(RUN) -m pip install --quiet --editable '.[dev]'
 	touch $(READY)
+
+# The official nuScenes evaluators, for the tests that compare with them; their pins want an environment of their own.
+devkit: $(DEVKIT)/.ready
+
+$(DEVKIT)/.ready:
+	$(PYTHON) -m venv $(DEVKIT)
+	$(DEVKIT)/bin/python -m pip install --quiet nuscenes-devkit==1.2.0
+	touch $(DEVKIT)/.ready
 
 STREETS = dataset=simulated dataset.root=$(DEMO)/streets
 MODEL = $(DEMO)/run/checkpoints/membership-last.ckpt
@@ -34,7 +43,7 @@ demo: setup
 	$(RUN) -m most.compare 'reports={nearest: $(DEMO)/nearest.json, full: $(DEMO)/metrics.json}'
 	@echo "tables: above, in $(DEMO)/metrics.json and $(DEMO)/nearest.json; picture: $(DEMO)/sweep.png"
 
-# Real scans, where there are any: MOST_REAL_DATA=FOLDER make test (FOLDER holds semantickitti/sequences/NN).
+# Real scans, where there are any: MOST_REAL_DATA=FOLDER make test (FOLDER holds semantickitti/sequences/NN and nuscenes).
 test: setup
 	OMP_NUM_THREADS=1 $(RUN) -m pytest -n 2 --dist worksteal --jaxtyping-packages=most,shapes.checked
 
@@ -48,4 +57,4 @@ bench: setup
 	$(RUN) benchmarks/network.py
 
 clean:
-	rm -rf $(VENV) $(DEMO) build dist outputs multirun .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(DEVKIT) $(DEMO) build dist outputs multirun .pytest_cache .mypy_cache .ruff_cache .hypothesis

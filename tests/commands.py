@@ -1,5 +1,6 @@
 """The real commands, as a user would type them, on sequences and networks small enough for a test."""
 
+import itertools
 import multiprocessing
 import os
 import resource
@@ -9,6 +10,8 @@ import sys
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
+
+import torch
 
 TINY = [
     "grid.voxel_size=[0.4,0.4,0.4]",
@@ -32,47 +35,7 @@ SIMULATE = [
     "simulation.sensor.columns=256",
 ]  # fmt: skip
 TRAIN = ["+experiment=sim_demo", "dataset.root=streets", "dataset.tables=tables", *SPLITS, *TINY]
-SIGNALLED = """
-import os, sys
-from most import train
-from most.entry import start
-from most.stages.checkpoints import LastCheckpoint
-
-hook, number, left = sys.argv.pop(1), int(sys.argv.pop(1)), int(sys.argv.pop(1))
-end = getattr(LastCheckpoint, hook)
-
-def hook_and_signal(self, *arguments):
-    global left
-    left -= 1
-    if left == 0:
-        os.killpg(0, number)  # as a terminal does: the loading processes get it too
-    end(self, *arguments)
-
-setattr(LastCheckpoint, hook, hook_and_signal)
-start(train.main)
-"""
-
-
-def most(folder: Path, command: str, *arguments: str) -> subprocess.CompletedProcess:
-    """Run a command in ``folder``."""
-    return python(folder, "-m", f"most.{command}", *arguments)
-
-
-def signalled(
-    folder: Path, number: int, batch: int, *arguments: str, hook: str = "on_train_batch_end"
-) -> subprocess.CompletedProcess:
-    """Train in ``folder``; at the ``batch``-th call of a hook all its processes get a signal."""
-    return python(folder, "-c", SIGNALLED, hook, str(number), str(batch), *arguments)
-
-
-def python(folder: Path, *arguments: str) -> subprocess.CompletedProcess:
-    """Run Python in ``folder``; W&B's own files go there too."""
-    places = {f"WANDB_{name}": str(folder / "wandb") for name in ("DIR", "DATA_DIR", "CACHE_DIR", "CONFIG_DIR")}
-    return subprocess.run(
-        [sys.executable, *arguments],
-        cwd=folder, env=os.environ | places | {"OMP_NUM_THREADS": "1"}, capture_output=True, text=True, check=False,
-        start_new_session=True,
-    )  # fmt: skip
+PRELOADED = [f"most.{command}" for command in ("train", "predict", "evaluate", "simulate", "submit", "compare", "draw")]
 
 
 @dataclass
@@ -80,18 +43,45 @@ class Done:
     """How a command ended; ``returncode`` is minus the signal that killed it."""
 
     returncode: int
+    stdout: str
     stderr: str
 
 
-class Forked:
-    """A command in a process forked from one that has imported everything: seconds sooner than a new interpreter."""
+@dataclass(frozen=True)
+class Signal:
+    """Sent to all processes of a training, as a terminal does, at the ``call``-th call of a hook of its checkpoints."""
 
-    def __init__(self, folder: Path, command: str, *arguments: str, largest_file: int | None = None) -> None:
+    number: int
+    call: int
+    hook: str = "on_train_batch_end"
+
+    def arm(self) -> None:
+        """Wait for the call in this process."""
+        from most.stages.checkpoints import LastCheckpoint  # in the process that it concerns
+
+        end, calls = getattr(LastCheckpoint, self.hook), itertools.count(1)
+
+        def signal_and_end(callback: object, *arguments: object) -> None:
+            if next(calls) == self.call:
+                os.killpg(0, self.number)
+            end(callback, *arguments)
+
+        setattr(LastCheckpoint, self.hook, signal_and_end)
+
+
+class Command:
+    """A running command, forked from a process that has imported everything: many seconds sooner than a new one."""
+
+    def __init__(
+        self, folder: Path, command: str, *arguments: str, largest_file: int | None = None, signal: Signal | None = None
+    ) -> None:
         """Start it in ``folder``, with a limit (bytes) that files run into as into a full disk."""
         context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(["most.train", "most.predict", "most.evaluate", "most.simulate"])
-        self.stderr = folder / f"{command}.stderr"
-        self.process = context.Process(target=_as_main, args=(folder, command, arguments, self.stderr, largest_file))
+        context.set_forkserver_preload(PRELOADED)
+        self.said = [folder.parent / f"{folder.name}.{command}.{kind}" for kind in ("stdout", "stderr")]
+        self.process = context.Process(
+            target=_as_main, args=(folder, command, arguments, self.said, largest_file, signal)
+        )
         self.process.start()
 
     def ends_within(self, seconds: float) -> bool:
@@ -106,17 +96,50 @@ class Forked:
     def done(self) -> Done:
         """Wait for its end."""
         self.process.join()
-        return Done(int(self.process.exitcode or 0), self.stderr.read_text())
+        return Done(int(self.process.exitcode or 0), *(path.read_text() for path in self.said))
 
 
-def _as_main(folder: Path, command: str, arguments: tuple[str, ...], stderr: Path, largest_file: int | None) -> None:
+def most(folder: Path, command: str, *arguments: str, signal: Signal | None = None) -> Done:
+    """Run a command in ``folder`` to its end."""
+    return Command(folder, command, *arguments, signal=signal).done()
+
+
+def most_anew(folder: Path, command: str, *arguments: str) -> Done:
+    """Run a command in ``folder`` in an interpreter of its own, as a shell does."""
+    done = subprocess.run(
+        [sys.executable, "-m", f"most.{command}", *arguments],
+        cwd=folder, env=os.environ | _environment(folder), capture_output=True, text=True, check=False,
+        start_new_session=True,
+    )  # fmt: skip
+    return Done(done.returncode, done.stdout, done.stderr)
+
+
+def _environment(folder: Path) -> dict[str, str]:
+    """W&B's own files go to the folder, too."""
+    places = {f"WANDB_{name}": str(folder / "wandb") for name in ("DIR", "DATA_DIR", "CACHE_DIR", "CONFIG_DIR")}
+    return places | {"OMP_NUM_THREADS": "1"}
+
+
+def _as_main(
+    folder: Path,
+    command: str,
+    arguments: tuple[str, ...],
+    said: list[Path],
+    largest_file: int | None,
+    signal: Signal | None,
+) -> None:
+    multiprocessing.set_start_method(None, force=True)  # what it starts, it starts as it would from a shell
+    os.setsid()  # signals to the group reach this command's processes alone
     os.chdir(folder)
-    for number in (1, 2):
-        os.dup2(os.open(stderr, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+    os.environ |= _environment(folder)
+    torch.set_num_threads(1)
+    for number, path in enumerate(said, start=1):
+        os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
     sys.stdout, sys.stderr = (open(number, "w", closefd=False) for number in (1, 2))  # noqa: SIM115
-    os.environ["OMP_NUM_THREADS"] = "1"
     if largest_file is not None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (largest_file, largest_file))
+    if signal is not None:
+        signal.arm()
     warnings.simplefilter("ignore", RuntimeWarning)  # of runpy: the module was imported before
     sys.argv = [f"most.{command}", *arguments]
     try:

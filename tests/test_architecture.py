@@ -23,10 +23,10 @@ COMPONENTS = {
     "membership": {"voxels", "normed_linear"},
     "panoptic": {"membership"},
     "tracking": set(),
-    "metrics": {"membership"},
+    "metrics": {"datasets", "membership"},
     "simulation": {"datasets"},
 }
-ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw", "submit", "track"}
+ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw", "submit", "track", "view"}
 OUTER = {"entry", "config", "assembly", "training", "checks"}
 
 

@@ -37,7 +37,10 @@ def test_the_report_and_the_table(folder: Path, monkeypatch: pytest.MonkeyPatch,
     assert panoptic["pq_stuff_present"] is None  # the one road point is too small a segment to count
     assert {"pq", "sq", "rq", "pq_dagger", "miou", "pq_things", "miou_stuff"} <= set(panoptic)
     assert panoptic["membership_accuracy"] is None
-    assert "car 66.7 66.7 100.0 66.7 1 0 0" in " ".join(capsys.readouterr().out.split())
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "car 66.7 66.7 100.0 66.7 1 0 0" in printed
+    assert "LSTQ PAT S_assoc S_cls PTQ PQ - - -" in printed
+    assert "LSTQ, S_assoc: none, since no thing of the truth has enough points in any scan to be followed" in printed
     assert sorted(path.name for path in folder.iterdir()) == ["data", "mine", "scores"]
 
 

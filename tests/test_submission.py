@@ -63,7 +63,7 @@ def test_a_package_holds_every_scan_of_the_split_and_the_same_bytes_every_time(
     assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
     with zipfile.ZipFile(tmp_path / "a.zip") as archive:
         assert archive.testzip() is None
-        labels = [name for name in archive.namelist() if not name.endswith(".json")]
+        labels = [name for name in archive.namelist() if not name.endswith((".json", "/"))]
         assert labels == [reader.prediction_path(Path(), frame).as_posix() for frame in frames]
         for name in labels:
             assert archive.read(name) == (folder / name).read_bytes()
@@ -78,7 +78,7 @@ def test_names_are_those_that_the_servers_expect(tmp_path: Path) -> None:
         write_submission(reader, "test", folder, tmp_path / f"{make.__name__}.zip", progress=False)
         with zipfile.ZipFile(tmp_path / f"{make.__name__}.zip") as archive:
             names = archive.namelist()
-            assert sum(name.startswith(pattern) for name in names) == len(frames)
+            assert sum(name.startswith(pattern) and name != pattern for name in names) == len(frames)
             if make is nuscenes:
                 meta = json.loads(archive.read("test/submission.json"))["meta"]
                 assert meta == dict.fromkeys(["use_camera", "use_radar", "use_map", "use_external"], False) | {

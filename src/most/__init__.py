@@ -9,7 +9,8 @@ The pipeline, stage by stage:
 5. ``most.heads`` read centre heat maps, heights, extents, velocities and classes off them;
 6. ``most.detections`` picks the peaks; ``most.membership`` says which point belongs to which centre;
 7. ``most.panoptic`` fuses both into a label for every point;
-8. ``most.metrics`` scores it, ``most.viz`` draws it, ``most.stages`` trains it.
+8. ``most.tracking`` gives instances identities over time;
+9. ``most.metrics`` scores it, ``most.viz`` draws it, ``most.stages`` trains it.
 """
 
 import os

@@ -10,7 +10,8 @@ from omegaconf import MISSING, DictConfig
 from most.config import conf_dir, register, store_root, typed
 from most.entry import run, start
 from most.metrics.folders import evaluate_folder
-from most.metrics.report import format_sequences, format_table, write_report
+from most.metrics.paper_tables import paper_rows, why_none
+from most.metrics.report import format_row, format_table, write_report
 
 
 @dataclass
@@ -28,14 +29,15 @@ store_root("evaluate", EvaluateConfig)
 
 
 def evaluate(config: EvaluateConfig) -> None:
-    """Write the report to ``out`` and print its table; labels are needed of the dataset, scans are not."""
+    """Write the report to ``out`` and print its tables; labels are needed of the dataset, scans are not."""
     reader = config.dataset.reader()
     frames = reader.labelled_frames(config.split)
     report = evaluate_folder(reader, frames, Path(config.predictions))
     write_report(Path(config.out), report)
     taxonomy = reader.taxonomy
     print(format_table(report["panoptic"], [taxonomy.class_names[thing] for thing in taxonomy.things]))
-    print(format_sequences(report))
+    for text in (*map(format_row, paper_rows(report)), *why_none(report)):
+        print(f"\n{text}")
 
 
 @hydra.main(version_base=None, config_path=str(conf_dir()), config_name="evaluate")

@@ -16,17 +16,24 @@ def is_partial(path: Path) -> bool:
 
 
 @contextmanager
-def atomic_write(path: Path, mode: str = "wb") -> Iterator[IO[Any]]:
-    """Open a temporary file beside ``path``; it takes that name when the block ends well, and goes when it does not."""
+def atomic_path(path: Path) -> Iterator[Path]:
+    """Give an empty file beside ``path`` to write to; it takes that name when the block ends well, else it goes."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=PARTIAL)
+    os.close(handle)
     try:
-        with os.fdopen(handle, mode) as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
+        yield Path(name)
         Path(name).chmod(0o644)
         Path(name).replace(path)
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
+
+
+@contextmanager
+def atomic_write(path: Path, mode: str = "wb") -> Iterator[IO[Any]]:
+    """Open a temporary file beside ``path``; it takes that name when the block ends well, and goes when it does not."""
+    with atomic_path(path) as part, part.open(mode) as file:
+        yield file
+        file.flush()
+        os.fsync(file.fileno())

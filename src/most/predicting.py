@@ -20,7 +20,7 @@ def claim_folder(out: Path, checkpoint: Path, reader: Reader, split: str, member
     """Note in ``out`` what is written there; another model's or dataset's are not mixed in, the same one's go on."""
     content = {
         "checkpoint_sha256": hashlib.sha256(checkpoint.read_bytes()).hexdigest(),
-        "dataset": str(Path(reader.root).resolve()),
+        "dataset": str(reader.place.resolve()),
         "split": split,
         "membership": membership,
         "sequences": reader.sequences(split),

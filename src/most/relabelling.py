@@ -1,5 +1,6 @@
 """Gives the instances of a folder of predictions, ours or anyone's, identities over time."""
 
+from dataclasses import asdict
 from itertools import groupby
 from pathlib import Path
 
@@ -8,7 +9,6 @@ from torch import Tensor
 from tqdm import tqdm
 
 from most.claims import claim
-from most.config import to_plain
 from most.datasets.reader import Frame, Reader
 from most.datasets.taxonomy import Taxonomy
 from most.errors import DataError
@@ -38,7 +38,7 @@ def write_tracks(reader: Reader, split: str, predictions: Path, out: Path, setti
         "dataset": str(Path(reader.root).resolve()),
         "split": split,
         "sequences": reader.sequences(split),
-        "tracker": to_plain("tracker", settings),
+        "tracker": asdict(settings),
     }
     claim(out, RECORD, content, "tracks of other predictions, settings, dataset or split")
     with tqdm(frames, "track", unit="sweep") as progress:

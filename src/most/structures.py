@@ -8,13 +8,14 @@ dataset's own raw labels, widened to int64: they identify an instance, and metri
 """
 
 from dataclasses import dataclass, fields, replace
-from typing import Self, TypeVar
+from typing import TypeVar
 
 import torch
 from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
 Structure = TypeVar("Structure", bound="OnDevice")
+Table = TypeVar("Table", bound="Rows")
 
 
 class OnDevice:
@@ -36,12 +37,12 @@ class Rows(OnDevice):
     def __len__(self) -> int:
         return len(next(iter(vars(self).values())))
 
-    def select(self, keep: Tensor) -> Self:
+    def select(self: Table, keep: Tensor) -> Table:
         """Keep the rows that a boolean mask or an index names."""
         return type(self)(**{name: value[keep] for name, value in vars(self).items()})
 
     @classmethod
-    def cat(cls, parts: list[Self]) -> Self:
+    def cat(cls: type[Table], parts: list[Table]) -> Table:
         """Put several tables under one another."""
         return cls(**{name: torch.cat([getattr(part, name) for part in parts]) for name in vars(parts[0])})
 

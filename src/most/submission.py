@@ -13,6 +13,7 @@ from most.datasets.taxonomy import Taxonomy
 from most.errors import DataError
 from most.files import atomic_write, is_partial
 
+FILE, FOLDER = 0o100644 << 16, 0o40755 << 16 | 0x10  # what they are, and who may read them
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the date of every file in an archive: the same predictions give the same bytes
 
 
@@ -32,18 +33,21 @@ def write_submission(reader: Reader, split: str, folder: Path, out: Path, progre
         listed = "\n".join(wrong)
         raise DataError(f"{listed}\n{folder}: expected a valid submission, found the {len(wrong)} problem(s) above")
     notes = reader.submission_notes(frames)
+    names = [reader.prediction_path(Path(), frame) for frame in frames]
     with atomic_write(out) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for place in sorted({place for name in (*names, *map(Path, notes)) for place in name.parents} - {Path()}):
+            archive.writestr(_entry(f"{place.as_posix()}/"), b"")  # SemanticKITTI's validator asks for the folders
         for name, content in notes.items():
             archive.writestr(_entry(name), content)
-        for frame in tqdm(frames, "package", unit="scan", disable=not progress):
-            path = reader.prediction_path(folder, frame)
-            archive.writestr(_entry(path.relative_to(folder).as_posix()), path.read_bytes())
+        for path in tqdm(names, "package", unit="scan", disable=not progress):
+            archive.writestr(_entry(path.as_posix()), (folder / path).read_bytes())
 
 
 def _entry(name: str) -> zipfile.ZipInfo:
+    """A file of the archive, or a folder, whose name ends in a slash."""
     entry = zipfile.ZipInfo(name, EPOCH)
     entry.compress_type = zipfile.ZIP_DEFLATED
-    entry.external_attr = 0o644 << 16
+    entry.external_attr = FOLDER if entry.is_dir() else FILE
     return entry
 
 

@@ -17,6 +17,7 @@ REQUIRED = {
     "predict": ["checkpoint=a.ckpt", "out=b"],
     "evaluate": ["predictions=a"],
     "submit": ["predictions=a"],
+    "view": ["predictions=a", "sequence='08'"],
     "track": ["predictions=a", "out=b"],
 }
 

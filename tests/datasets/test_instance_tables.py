@@ -5,7 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import nuscenes_tree
 from most.datasets.instances import InstanceTables
+from most.datasets.nuscenes import PanopticNuScenes
 from most.datasets.reader import Frame
 from most.datasets.semantickitti import SemanticKITTI
 from most.errors import DataError
@@ -35,3 +37,19 @@ def test_table_is_kept_and_follows_its_sources(tree: Path) -> None:
 def test_unlabelled_sequence_is_refused(tree: Path) -> None:
     with pytest.raises(DataError, match=r"11/labels/000000\.label: expected a file"):
         tables(tree).table("11")
+
+
+def test_versions_under_one_root_keep_tables_of_their_own(tmp_path: Path) -> None:
+    """The mini version has its scenes under the same names as the full one."""
+
+    def make(version: str) -> dict[Path, int]:
+        reader = PanopticNuScenes(tmp_path / "nuscenes", version)
+        InstanceTables(reader, ShrinkWrap(), tmp_path / "tables").table("scene-0061")
+        return {path: path.stat().st_mtime_ns for path in (tmp_path / "tables").rglob("scene-0061.npz")}
+
+    for version in ("v1.0-mini", "v1.0-trainval"):
+        nuscenes_tree.write_tree(tmp_path / "nuscenes", {"scene-0061": True}, version=version)
+    assert len(make("v1.0-mini")) == 1
+    both = make("v1.0-trainval")
+    assert len(both) == 2
+    assert make("v1.0-mini") == make("v1.0-trainval") == both

@@ -1,12 +1,14 @@
 """Panoptic nuScenes: a tiny tree with answers worked out by hand."""
 
 import math
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
+from most.datasets.dataset import WindowDataset
 from most.datasets.nuscenes import PanopticNuScenes, SceneSplits, official_scenes
 from most.datasets.reader import Frame
 from most.datasets.windows import gather_window, previous_frames
@@ -119,3 +121,10 @@ def test_labels_suffice_for_scoring(reader: PanopticNuScenes) -> None:
         frames = reader.labelled_frames("val")
     assert frames == [Frame("scene-0003", index) for index in (0, 2, 4)]
     assert reader.labels(frames[1])[0] == CAR
+
+
+def test_tables_are_read_before_loading_starts(reader: PanopticNuScenes) -> None:
+    """Or each loading process would read them, gigabytes as they are."""
+    dataset = WindowDataset(reader, reader.key_frames(SCENE), previous=2)
+    shutil.rmtree(reader.place)
+    assert len(dataset[1].points) == 3 * 8

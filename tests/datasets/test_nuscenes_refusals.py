@@ -53,6 +53,8 @@ def test_faulty_settings(options: dict, message: str) -> None:
 def test_faulty_scene_names() -> None:
     with pytest.raises(ConfigError, match=r"dataset\.splits\.val: expected names such as scene-0061, found '0061'"):
         SceneSplits(val=["0061"])
+    with pytest.raises(ConfigError, match=r"dataset\.splits\.train: expected each .* once, found scene-0061 twice"):
+        SceneSplits(train=["scene-0061", "scene-0103", "scene-0061"])
 
 
 def test_version_that_is_not_there(root: Path) -> None:
@@ -68,6 +70,11 @@ def test_unlabelled_scene_of_a_labelled_split(root: Path) -> None:
 def changed(table: str, row: int, **entries: object) -> Callable[[Tables], object]:
     """Change entries of one row."""
     return lambda rows: rows[table][row].update(entries)
+
+
+def repeated(table: str) -> Callable[[Tables], object]:
+    """Repeat a table's first row under another token."""
+    return lambda rows: rows[table].append(rows[table][0] | {"token": "again"})
 
 
 def without(table: str, row: int) -> Callable[[Tables], object]:
@@ -115,6 +122,16 @@ def test_dangling_token(root: Path, change: Callable, table: str, token: str, as
         (changed("sample_data", LIDAR_2, timestamp="noon"), f"row '{SCENE}-2': timestamp: expected int, found 'noon'"),
         (changed("scene", 0, name=None), f"scene.json: row 'token-{SCENE}': name: expected str, found None"),
         (changed("sample", 1, token=f"{SCENE}-sample-0"), f"sample.json: .* once, found {SCENE}-sample-0 twice"),
+        (repeated("scene"), f"scene.json: expected each name once, found {SCENE} twice"),
+        (
+            repeated("sample_data"),
+            f"sample_data.json: .* each filename once, found samples/.*{SCENE}-0.* tw",
+        ),
+        (repeated("panoptic"), f"panoptic.json: expected each sample_data_token once, found {SCENE}-0 twice"),
+        (
+            changed("panoptic", 0, filename=LABELS),
+            f"panoptic.json: expected each filename once, found {LABELS} twice",
+        ),
         (changed("ego_pose", 2, rotation=[2, 0, 0, 0]), f"row 'ego-{SCENE}-2': rotation: expected .* length 1"),
         (changed("ego_pose", 2, translation=[1, 2]), rf"row 'ego-{SCENE}-2': translation: .*3 numbers, found \[1, 2\]"),
         (changed("ego_pose", 2, translation=[1, 2, math.nan]), "translation: expected finite numbers"),

@@ -26,6 +26,11 @@ def test_command_line_names_sequences_without_quotes() -> None:
     assert OmegaConf.to_object(merged).val == ["07", "10"]  # type: ignore[union-attr]
 
 
+def test_a_sequence_named_twice_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"dataset\.splits\.val: expected each sequence once, found 07, 08 twice"):
+        Splits(val=["08", "07", "08", "07", "06"])
+
+
 def test_unquoted_numbers_of_a_yaml_file_are_refused_with_the_quoted_form() -> None:
     merged = OmegaConf.merge(OmegaConf.structured(Splits), OmegaConf.create("val: [00, 07, 08]"))
     with pytest.raises(ConfigError, match=r"dataset\.splits\.val: .*found \[0, 7, 08\].*write \['00', '07', '08'\]"):
@@ -126,6 +131,7 @@ def break_file(tree: Path, name: str, content: bytes | None) -> None:
         ("poses.txt", None, "found no file"),
         ("times.txt", b"0.0\n", "expected a row for scan 000001, found 1 rows"),
         ("times.txt", b"0.0 1.0\n", r"line 1: expected 1 finite number\(s\), found 2"),
+        ("times.txt", b"0.0\n0.1\n0.1\n", r", line 3: expected a time after 0\.1 s, found 0\.1 s; a scan is"),
         ("times.txt", None, "found no file"),
         ("calib.txt", b"P0: 1\nP1: 2\n", r"expected a line 'Tr: \.\.\.' .* found P0, P1; "),
         ("calib.txt", b"Tr: 1 2 3\n", "Tr: expected 12 finite"),

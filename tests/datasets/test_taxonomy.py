@@ -40,6 +40,7 @@ def test_nuscenes_is_the_official_class_map() -> None:
     assert (taxonomy.num_classes, taxonomy.min_points) == (17, 15)
     assert (taxonomy.things, taxonomy.stuff) == (list(range(1, 11)), list(range(11, 17)))
     assert (taxonomy.class_names[4], taxonomy.class_names[11]) == ("car", "driveable_surface")
+    assert taxonomy.gates == [0, 1, 3, 5.5, 4, 4, 13, 1, 1, 3, 4, 0, 0, 0, 0, 0, 0]
     with pytest.raises(DataError, match=r"expected raw class ids 0\.\.31 of nuscenes, found 32"):
         taxonomy.to_training(torch.tensor([32000]))
 
@@ -108,9 +109,11 @@ def test_every_taxonomy_file_holds_together(path: Path) -> None:
         ({"min_points": "50"}, "min_points: expected int, found '50'"),
         ({"min_points": None}, "min_points: expected int, found None"),
         ({"label": {"high": "colour", "step": 10}}, "label.high: expected class or instance, found 'colour'"),
-        ({"label": {"high": "class", "step": 1}}, "label.step: expected a number above 1, found 1"),
+        ({"label": {"high": "class", "step": 1, "unique_in": "class"}}, "label.step: expected a number above 1"),
+        ({"label": {"high": "class", "step": 9}}, "label.unique_in: expected class or sequence, found None"),
         ({"label": 1000}, "label: expected dict, found 1000"),
         ({"predicted_as": "colour"}, "predicted_as: expected raw or training, found 'colour'"),
+        ({"evaluator": "waymo"}, "evaluator: expected semantickitti or nuscenes, found 'waymo'"),
         ({"classes": [{"name": "void"}]}, r"classes\[0\]: expected the keys name, kind, raw, colour"),
         ({"kind": "stuff"}, r"classes\[0\]\.kind: expected void, found 'stuff'"),
         ({"raw": [9]}, r"classes\[0\]\.raw: expected ids in 0\.\.3, found \[9\]"),
@@ -121,15 +124,29 @@ def test_every_taxonomy_file_holds_together(path: Path) -> None:
 )
 def test_faulty_file_is_refused(tmp_path: Path, change: dict, message: str) -> None:
     void = {"name": "void", "kind": "void", "raw": [0], "colour": [0, 0, 0]}
-    car = {"name": "car", "kind": "thing", "raw": [1], "colour": [1, 1, 1]}
+    car = {"name": "car", "kind": "thing", "raw": [1], "colour": [1, 1, 1], "gate": 4}
     top = {key: value for key, value in change.items() if key not in void}
     inner = {key: value for key, value in change.items() if key in void}
-    label = {"high": "class", "step": 10}
+    label = {"high": "class", "step": 10, "unique_in": "class"}
     content = {"name": "toy", "min_points": 5, "raw_table_size": 4, "label": label, "predicted_as": "raw"}
-    content |= {"classes": [void | inner, car]} | top
+    content |= {"evaluator": "nuscenes", "classes": [void | inner, car]} | top
     path = tmp_path / "toy.yaml"
     path.write_text(yaml.safe_dump(content))
     with pytest.raises(DataError, match=f"toy.yaml: {message}"):
+        Taxonomy.read(path)
+
+
+@pytest.mark.parametrize(("gate", "message"), [
+    (None, "expected the keys name, kind, raw, colour, gate"), (0, "gate: expected metres above 0, found 0"),
+    ("4", "gate: expected metres above 0, found '4'"),
+])  # fmt: skip
+def test_a_thing_without_a_gate_is_refused(tmp_path: Path, gate: object, message: str) -> None:
+    content = yaml.safe_load((TAXONOMIES / "semantickitti.yaml").read_text())
+    content["classes"][1] = {key: value for key, value in content["classes"][1].items() if key != "gate"}
+    content["classes"][1] |= {} if gate is None else {"gate": gate}
+    path = tmp_path / "toy.yaml"
+    path.write_text(yaml.safe_dump(content))
+    with pytest.raises(DataError, match=message):
         Taxonomy.read(path)
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import torch
 
-from commands import SIMULATE, TRAIN, most
+from commands import SIMULATE, TRAIN, most, most_anew
 
 TWO = ["trainer=ddp", "trainer.accelerator=cpu", "trainer.devices=2", "logger=none", "logger.pictures=0"]
 
@@ -14,7 +14,7 @@ def test_two_processes_train_both_stages_and_count_every_sweep_once(tmp_path: Pa
     assert most(tmp_path, "simulate", *SIMULATE, "simulation.scans=4").returncode == 0
     arguments = [*TRAIN, "trainer.validate_every=1", "trainer.precision=32-true"]
     for run, extra in {"two": TWO, "one": ["dataset.batch_size=2", "logger=none", "logger.pictures=0"]}.items():
-        done = most(tmp_path, "train", *arguments, *extra, f"hydra.run.dir={run}")
+        done = most_anew(tmp_path, "train", *arguments, *extra, f"hydra.run.dir={run}")
         assert done.returncode == 0, done.stderr
     one, two = (json.loads((tmp_path / run / "metrics.json").read_text())["panoptic"] for run in ("one", "two"))
     for name, figures in one["per_class"].items():  # a sweep counted twice would show

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from commands import SIMULATE, TRAIN, most, signalled
+from commands import SIMULATE, TRAIN, Signal, most
 
 ARGUMENTS = [*TRAIN, "logger=none", "logger.pictures=0", "trainer.progress_bar=false", "trainer.validate_every=1"]
 
@@ -38,7 +38,8 @@ def test_after_sigkill_a_resumed_run_ends_with_the_same_weights(folder: Path, st
     """Killed after the checkpoint within the second epoch, and after the one that the first epoch left."""
     run = f"killed_{batch}"
     arguments = [*ARGUMENTS, f"hydra.run.dir={run}"]
-    assert signalled(folder, signal.SIGKILL, batch, *arguments).returncode == -signal.SIGKILL
+    killed = most(folder, "train", *arguments, signal=Signal(signal.SIGKILL, batch))
+    assert killed.returncode == -signal.SIGKILL
     done = most(folder, "train", *arguments, f"resume={run}/checkpoints/{stage}-last.ckpt")
     assert done.returncode == 0, done.stderr
     assert_same_as_uninterrupted(folder, run)
@@ -48,7 +49,7 @@ def test_sigint_ends_with_a_checkpoint_and_says_how_to_go_on_as_often_as_it_come
     """In a step, in a validation, and in the last step of an epoch."""
     arguments, told = [*ARGUMENTS, "dataset.workers=1"], ["hydra.run.dir=stopped"]
     for hook, call in (("on_train_batch_end", 2), ("on_validation_batch_end", 1), ("on_train_batch_end", 1)):
-        stopped = signalled(folder, signal.SIGINT, call, *arguments, *told, hook=hook)
+        stopped = most(folder, "train", *arguments, *told, signal=Signal(signal.SIGINT, call, hook))
         assert stopped.returncode == 130, stopped.stderr
         assert "Traceback" not in stopped.stderr
         told = stopped.stderr.split("repeat the command with ")[1].split()

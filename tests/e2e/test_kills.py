@@ -7,7 +7,7 @@ from pathlib import Path
 
 import torch
 
-from commands import SIMULATE, TRAIN, Forked
+from commands import SIMULATE, TRAIN, Command
 
 QUIET = ["logger=none", "logger.pictures=0", "trainer.progress_bar=false", "trainer.save_every=0.00001"]
 PREDICT = ["checkpoint=model.ckpt", "split=val", "dataset=simulated", "dataset.root=streets", "dataset.workers=0",
@@ -17,7 +17,7 @@ PREDICT = ["checkpoint=model.ckpt", "split=val", "dataset=simulated", "dataset.r
 def calmly(folder: Path, command: str, *arguments: str) -> float:
     """Let a command end; return how long it took, s."""
     begin = time.monotonic()
-    done = Forked(folder, command, *arguments).done()
+    done = Command(folder, command, *arguments).done()
     assert done.returncode == 0, done.stderr
     return time.monotonic() - begin
 
@@ -27,7 +27,7 @@ def disturbed(
 ) -> int:
     """Kill a command ``kills`` times within ``seconds`` of its start, then let it end; return how often it lived."""
     lived = sum(
-        not Forked(folder, command, *arguments()).ends_within(chance.uniform(0.0, seconds)) for _ in range(kills)
+        not Command(folder, command, *arguments()).ends_within(chance.uniform(0.0, seconds)) for _ in range(kills)
     )
     calmly(folder, command, *arguments())
     return lived

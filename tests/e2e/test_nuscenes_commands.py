@@ -41,7 +41,9 @@ def test_predictions_are_scored_with_the_devkits_figures(folder: Path) -> None:
     assert {"pat", "tq", "ptq", "sptq", "lstq", "s_assoc", "per_class"} <= report["tracking"].keys()
     assert report["panoptic"]["per_class"].keys() >= {"car", "driveable_surface"}
     assert report["panoptic"]["membership_accuracy"] is None or 0 <= report["panoptic"]["membership_accuracy"] <= 1
-    assert "sPTQ" in done.stdout
+    for title in ("panoptic segmentation (Tables III, IV)", "4D panoptic segmentation (Table V)", "PQ by class"):
+        assert title in done.stdout
+    assert all(len(line) <= 120 for line in done.stdout.splitlines())
 
 
 @pytest.mark.parametrize(("split", "version"), [("val", "v1.0-trainval"), ("test", "v1.0-test")])

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commands import SPLITS, TINY, Forked
+from commands import SPLITS, TINY, Command
 from semantickitti_tree import write_sequence
 
 TRAIN = ["+experiment=sim_demo", "dataset.root=tree", "dataset.tables=tables", *SPLITS, *TINY, "logger=none",
@@ -29,14 +29,14 @@ def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("trained")
     for name in ("00", "01"):
         write_sequence(folder / "tree", name, range(4))
-    done = Forked(folder, "train", *TRAIN, "stage.detection.epochs=1").done()
+    done = Command(folder, "train", *TRAIN, "stage.detection.epochs=1").done()
     assert done.returncode == 0, done.stderr
     return folder / "run" / "checkpoints" / "detection-last.ckpt"
 
 
 def refused(folder: Path, command: str, *arguments: str, **limits: int) -> str:
     """Run a command that must be refused; return its message."""
-    done = Forked(folder, command, *arguments, **limits).done()
+    done = Command(folder, command, *arguments, **limits).done()
     assert done.returncode == 2, done.stderr
     assert "Traceback" not in done.stderr
     assert done.stderr.count("most: ") == 1
@@ -162,10 +162,10 @@ def test_empty_scans_and_non_finite_points_are_no_error(folder: Path, checkpoint
     points = np.fromfile(sequence / "velodyne/000001.bin", "<f4").reshape(-1, 4)
     points[0], points[1, 2] = np.nan, np.inf
     points.tofile(sequence / "velodyne/000001.bin")
-    done = Forked(folder, "predict", *PREDICT, f"checkpoint={checkpoint}").done()
+    done = Command(folder, "predict", *PREDICT, f"checkpoint={checkpoint}").done()
     assert done.returncode == 0, done.stderr
     written = folder / "out" / "sequences" / "01" / "predictions"
     assert (written / "000000.label").stat().st_size == 0
     assert (np.fromfile(written / "000001.label", "<u4") > 0).sum() == len(points)
-    done = Forked(folder, "train", *TRAIN, "dataset.splits.train=['01']", "dataset.splits.val=['01']").done()
+    done = Command(folder, "train", *TRAIN, "dataset.splits.train=['01']", "dataset.splits.val=['01']").done()
     assert done.returncode == 0, done.stderr

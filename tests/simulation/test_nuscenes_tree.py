@@ -3,6 +3,7 @@
 import hashlib
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -173,9 +174,41 @@ def test_another_tree_and_other_settings_are_refused(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"v1\.0-trainval: expected no tables .* found others; choose another out"):
         simulate(settings(VAL), tmp_path)
     (tmp_path / "simulation").mkdir()
-    (tmp_path / f"simulation/{VAL}.json").write_text('{"made_from": {"seed": 9}}')
+
+
+@pytest.fixture
+def short(tmp_path: Path) -> Path:
+    """A tree of one scene of one scan."""
+    simulate(settings(VAL, scans=1), tmp_path / "short")
+    return tmp_path / "short"
+
+
+@pytest.mark.parametrize("scene", [VAL, TEST, "scene-0012"])
+def test_scenes_of_another_seed_are_refused_whichever_are_asked_for(short: Path, scene: str) -> None:
+    before = digests(short)
     with pytest.raises(DataError, match=rf"simulation/{VAL}\.json: expected the settings asked for now, found others"):
-        simulate(settings(VAL), tmp_path)
+        simulate(settings(scene, seed=1, scans=1), short)
+    assert digests(short) == before
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda text: text[:-9], "expected a scene's record, found none"),
+        (lambda text: "7", "expected a scene's made_from and tables, found something else"),
+        (lambda text: text.replace('"tables"', '"table"'), "expected a scene's made_from and tables"),
+        (lambda text: text.replace('"made_from"', '"made"'), "expected a scene's made_from and tables"),
+        (lambda text: text.replace('"sample"', '"samples"'), r"tables\.sample: expected a list of rows"),
+    ],
+)
+def test_damaged_records_are_refused_by_name(short: Path, damage: Callable[[str], str], message: str) -> None:
+    record = short / f"simulation/{VAL}.json"
+    record.write_text(damage(record.read_text()))
+    with pytest.raises(DataError, match=rf"simulation/{VAL}\.json: {message}"):
+        simulate(settings(TEST, scans=1), short)
+    record.unlink()
+    simulate(settings(VAL, scans=1), short)
+    assert record.is_file()
 
 
 @pytest.mark.parametrize(

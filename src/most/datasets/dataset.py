@@ -42,6 +42,10 @@ class WindowDataset(Dataset[Sample]):
         self.seed = seed
         self.cached: dict[Frame, Sweep] | None = {} if cache else None
         self.neighbours = {name: reader.frames_of(name) for name in {frame.sequence for frame in frames}}
+        for name in self.neighbours:
+            reader.poses(
+                name
+            )  # the reader keeps them: read here once, they are not read again by every loading process
         self.epoch = torch.zeros((), dtype=torch.int64).share_memory_()
 
     def __len__(self) -> int:

@@ -33,7 +33,7 @@ class InstanceTables:
 
     def _load_or_build(self, sequence: str) -> InstanceTable:
         frames, taxonomy = self.reader.key_frames(sequence), self.reader.taxonomy
-        meaning = {key: value for key, value in asdict(taxonomy).items() if key != "min_points"}  # that is for scoring
+        meaning = {key: value for key, value in asdict(taxonomy).items() if key not in ("min_points", "evaluator")}
         made_from = fingerprint(*self.reader.sources(sequence), meaning)
         rules = LabelRules(taxonomy.to_training, taxonomy.is_thing, taxonomy.instance_of, self.reader.max_gap)
         path = self.folder / self._tree() / f"{sequence}.npz"
@@ -41,5 +41,5 @@ class InstanceTables:
 
     def _tree(self) -> str:
         """A name for the reader's tree, so that several of one format can keep their tables side by side."""
-        place = hashlib.sha256(str(self.reader.root.resolve()).encode()).hexdigest()
+        place = hashlib.sha256(str(self.reader.place.resolve()).encode()).hexdigest()
         return f"{self.reader.taxonomy.name}-{place[:8]}"

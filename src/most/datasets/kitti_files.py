@@ -69,6 +69,17 @@ def read_rows(path: Path, columns: int) -> Float64[Tensor, "rows columns"]:
     return torch.tensor(rows, dtype=torch.float64).reshape(-1, columns)
 
 
+def read_times(path: Path) -> Float64[Tensor, "rows"]:
+    """Read seconds by frame number, each later than the one before."""
+    times = read_rows(path, 1)[:, 0]
+    if late := (times.diff() <= 0).nonzero().flatten().tolist():
+        raise DataError(
+            f"{path}, line {late[0] + 2}: expected a time after {times[late[0]]:g} s, found {times[late[0] + 1]:g} s; "
+            "a scan is listed twice, or the file is another's: copy it again"
+        )
+    return times
+
+
 def read_calibration(path: Path) -> Float64[Tensor, "4 4"]:
     """Read camera_from_lidar, the line ``Tr:`` of calib.txt."""
     if not path.is_file():

@@ -29,6 +29,7 @@ class Reader(Protocol):
     """Reads one dataset; all errors are DataErrors that name file, expectation, finding and remedy."""
 
     root: Path
+    place: Path  # tells what is read from all else: the root, or a folder in it where a root holds several versions
     taxonomy: Taxonomy
     max_gap: float  # s between two key frames of a track that still tell its velocity
 
@@ -69,7 +70,7 @@ class Reader(Protocol):
         ...
 
     def poses(self, sequence: str) -> Float64[Tensor, "rows 4 4"]:
-        """World_from_sensor by frame number."""
+        """World_from_sensor by frame number; read when first asked for, and kept."""
         ...
 
     def sources(self, sequence: str) -> tuple[list[Path], list[Path]]:

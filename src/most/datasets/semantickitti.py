@@ -10,11 +10,11 @@ from pathlib import Path
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
-from most.datasets.kitti_files import count_points, read_poses, read_rows, read_scan
+from most.datasets.kitti_files import count_points, read_poses, read_scan, read_times
 from most.datasets.labels import read_labels, write_labels
 from most.datasets.reader import SPLITS, Frame
 from most.datasets.settings import DatasetSettings
-from most.datasets.splits import check_split, present_sequences
+from most.datasets.splits import check_once, check_split, present_sequences
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError, DataError
 from most.structures import Sweep
@@ -37,6 +37,7 @@ class Splits:
                     f"dataset.splits.{split}: expected quoted sequence names of two digits, found "
                     f"[{', '.join(names)}]; YAML reads an unquoted 07 as the number 7: write [{quoted}]"
                 )
+            check_once(split, names)
 
 
 @dataclass
@@ -57,7 +58,7 @@ class SemanticKITTI:
     max_gap = 0.35  # s; scans are 0.1 s apart
 
     def __init__(self, root: str | Path, splits: Splits | None = None) -> None:
-        self.root = Path(root).expanduser()
+        self.root = self.place = Path(root).expanduser()
         self.splits = splits or Splits()
         self.taxonomy = Taxonomy.load("semantickitti")
         self._poses: dict[str, Tensor] = {}
@@ -136,7 +137,7 @@ class SemanticKITTI:
     def times(self, sequence: str) -> Float64[Tensor, "rows"]:
         """Time of each scan in seconds, by frame number."""
         if sequence not in self._times:
-            self._times[sequence] = read_rows(self.folder(sequence) / "times.txt", 1)[:, 0]
+            self._times[sequence] = read_times(self.folder(sequence) / "times.txt")
         return self._times[sequence]
 
     def sources(self, sequence: str) -> tuple[list[Path], list[Path]]:

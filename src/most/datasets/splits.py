@@ -16,6 +16,12 @@ def check_split(split: str) -> None:
         raise ConfigError(f"split: expected one of {', '.join(SPLITS)}, found {split!r}")
 
 
+def check_once(split: str, names: list[str]) -> None:
+    """Raise a ConfigError where a split names a sequence twice."""
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise ConfigError(f"dataset.splits.{split}: expected each sequence once, found {', '.join(twice)} twice")
+
+
 def present_sequences(root: Path, split: str, wanted: list[str], is_there: Callable[[str], bool]) -> list[str]:
     """Those of a split's sequences that are there; warns about the others, unless none is there at all."""
     present = [name for name in wanted if is_there(name)]

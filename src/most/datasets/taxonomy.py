@@ -25,12 +25,14 @@ ENTRIES = {
     "raw_table_size": int,
     "label": dict,
     "predicted_as": str,
+    "evaluator": str,
     "classes": list,
 }
 CHOICES = {
     "label.high": ("class", "instance"),
     "label.unique_in": ("class", "sequence"),
     "predicted_as": ("raw", "training"),
+    "evaluator": ("semantickitti", "nuscenes"),
 }
 
 
@@ -71,6 +73,7 @@ class Taxonomy:
     label: LabelCode
     predicted_as: str  # which id a submission holds: "raw", the first of the class's raw ids, or "training"
     gates: list[float]  # m in half a second that a tracker may miss a thing of the class by; 0 where it is none
+    evaluator: str  # whose 4D figures: "semantickitti" (LSTQ) or "nuscenes" (PAT, PTQ, TQ, and LSTQ in its version)
 
     @staticmethod
     def load(name: str) -> "Taxonomy":
@@ -99,6 +102,7 @@ class Taxonomy:
             label=LabelCode(*(content["label"][key] for key in ("high", "step", "unique_in"))),
             predicted_as=content["predicted_as"],
             gates=[float(entry.get("gate", 0)) for entry in classes],
+            evaluator=content["evaluator"],
         )
 
     @property

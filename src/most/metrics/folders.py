@@ -3,26 +3,23 @@
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Generic
+from typing import Any
 
 from jaxtyping import Float, Int64
 from torch import Tensor
 from tqdm import tqdm
 
+from most.datasets.reader import Frame, Reader
+from most.datasets.taxonomy import Taxonomy
 from most.errors import DataError
 from most.metrics.assignments import assignments_path, read_assignments
+from most.metrics.instances import find_instances
 from most.metrics.membership import MembershipCounts, membership_counts
 from most.metrics.panoptic import PanopticStatistics, panoptic_figures, panoptic_statistics, per_class
 from most.metrics.sequences import SequenceScores
-from most.metrics.truth import Frame, Taxonomy, TruthReader, find_instances
 
 
-def evaluate_folder(
-    reader: TruthReader[Frame],
-    frames: Sequence[Frame],
-    folder: Path,
-    progress: bool = True,
-) -> dict[str, Any]:
+def evaluate_folder(reader: Reader, frames: Sequence[Frame], folder: Path, progress: bool = True) -> dict[str, Any]:
     """Score the predictions of ``frames``, in the order of time, in ``folder`` and return the report.
 
     ``{"scans": ..., "panoptic": {pq, ..., membership_accuracy, membership_accuracy_contested, per_class}}``, with
@@ -39,10 +36,10 @@ def evaluate_folder(
     return {"scans": len(frames)} | scores.report()
 
 
-class _Scores(Generic[Frame]):
+class _Scores:
     """All figures of a folder, summed over its scans."""
 
-    def __init__(self, reader: TruthReader[Frame], with_memberships: bool) -> None:
+    def __init__(self, reader: Reader, with_memberships: bool) -> None:
         self.reader, self.taxonomy = reader, reader.taxonomy
         self.panoptic = PanopticStatistics.zeros(len(self.taxonomy.class_names))
         self.sequences = SequenceScores(self.taxonomy)
@@ -74,7 +71,7 @@ class _Scores(Generic[Frame]):
         return {"panoptic": figures | classes} | self.sequences.report()
 
 
-def prediction_paths(reader: TruthReader[Frame], frames: Sequence[Frame], folder: Path) -> list[Path]:
+def prediction_paths(reader: Reader, frames: Sequence[Frame], folder: Path) -> list[Path]:
     """Where the predictions lie; raises DataError unless all are there."""
     if not frames:
         raise DataError(f"{folder}: expected predictions of scans, found no scan in the split")
@@ -87,7 +84,7 @@ def prediction_paths(reader: TruthReader[Frame], frames: Sequence[Frame], folder
     return paths
 
 
-def _has_assignments(reader: TruthReader[Frame], frames: Sequence[Frame], paths: Sequence[Path]) -> bool:
+def _has_assignments(reader: Reader, frames: Sequence[Frame], paths: Sequence[Path]) -> bool:
     """Whether everything is there that the membership accuracy needs; says so where only a part is."""
     there = sum(assignments_path(path).is_file() for path in paths)
     if not there:

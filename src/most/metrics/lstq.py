@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int64
 
+from most.metrics.means import mean, ratio
 from most.metrics.panoptic import EPS, PointCounts
 from most.metrics.tables import find_rows, sum_rows
 from most.metrics.tubes import TubeStatistics
@@ -33,7 +34,7 @@ class Association:
 
     def mean_over(self, things: Sequence[int]) -> float:
         """The sum over all classes by the number of ``things``: NaN, or infinite, where there is none."""
-        return _ratio(float(self.sums.sum()), int(self.tubes[list(things)].sum()))
+        return ratio(float(self.sums.sum()), int(self.tubes[list(things)].sum()))
 
 
 def associate(statistics: TubeStatistics, column: int = OFFICIAL) -> Association:
@@ -64,17 +65,17 @@ def lstq_semantickitti(statistics: TubeStatistics, things: Sequence[int]) -> dic
     """
     counts = PointCounts.of(statistics.confusion)
     present = int((counts.union() > 0).sum())
-    s_cls = _ratio(float(counts.iou().sum()), present)
+    s_cls = ratio(float(counts.iou().sum()), present)
     official, repaired = associate(statistics), _repaired_association(statistics, things)
     stuff = [index for index in range(1, len(statistics.confusion)) if index not in things]
     return _lstq(official.mean_over(things), s_cls, repaired.mean_over(things)) | {
-        "aq_p": _mean(official.precisions),
-        "aq_r": _mean(official.recalls),
-        "iou_p": _ratio(float((counts.hits / counts.predicted.clamp(min=EPS)).sum()), present),
-        "iou_r": _ratio(float((counts.hits / counts.true.clamp(min=EPS)).sum()), present),
+        "aq_p": mean(official.precisions),
+        "aq_r": mean(official.recalls),
+        "iou_p": ratio(float((counts.hits / counts.predicted.clamp(min=EPS)).sum()), present),
+        "iou_r": ratio(float((counts.hits / counts.true.clamp(min=EPS)).sum()), present),
         "iou_things": float(counts.iou()[list(things)].mean()),
         "iou_stuff": float(counts.iou()[stuff].mean()),
-        "aq_p_repaired": _mean(repaired.precisions),
+        "aq_p_repaired": mean(repaired.precisions),
     }
 
 
@@ -118,13 +119,3 @@ def _lstq(s_assoc: float, s_cls: float, repaired: float) -> dict[str, float]:
         "lstq_repaired": float(np.sqrt(repaired * s_cls)),
         "s_assoc_repaired": repaired,
     }
-
-
-def _mean(values: Float64[np.ndarray, "pairs"]) -> float:
-    return _ratio(float(values.sum()), len(values))
-
-
-def _ratio(part: float, whole: float) -> float:
-    """0 / 0 is NaN."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return float(np.float64(part) / np.float64(whole))

@@ -14,6 +14,7 @@ from jaxtyping import Float, Int64
 from torch import Tensor
 
 from most.membership.matching import match_detections
+from most.metrics.means import ratio
 from most.structures import Detections, Instances
 
 CHUNK = 2**20  # pairs of points and detections compared at once: some 30 MB
@@ -34,8 +35,8 @@ class MembershipCounts:
     def accuracies(self) -> dict[str, float]:
         """``membership_accuracy`` and ``membership_accuracy_contested``, in [0, 1]; NaN where nothing was counted."""
         return {
-            "membership_accuracy": _ratio(self.correct, self.total),
-            "membership_accuracy_contested": _ratio(self.contested_correct, self.contested_total),
+            "membership_accuracy": ratio(self.correct, self.total),
+            "membership_accuracy_contested": ratio(self.contested_correct, self.contested_total),
         }
 
 
@@ -69,7 +70,3 @@ def membership_counts(
             numbers = (right, inside, right[contested], inside[contested])
             counts += MembershipCounts(*(int(number.sum()) for number in numbers))
     return counts
-
-
-def _ratio(part: int, whole: int) -> float:
-    return part / whole if whole else float("nan")

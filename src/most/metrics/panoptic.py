@@ -11,9 +11,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Float64, Int64
 from torch import Tensor
 
+from most.metrics.means import mean
 from most.metrics.overlaps import Matches, Overlaps, find_overlaps, totals
 
 EPS = 1e-15  # the official evaluators' guard: a class that never occurs scores 0, and stays in the means
@@ -147,16 +148,12 @@ def panoptic_figures(statistics: PanopticStatistics, things: Sequence[int]) -> d
         "rq": (figures.rq, with_segments),
         "miou": (figures.iou, with_points),
     }
-    means = {"pq_dagger": _mean(torch.where(thing, figures.pq, figures.iou), named)}
+    means = {"pq_dagger": mean(torch.where(thing, figures.pq, figures.iou)[named])}
     for name, (values, present) in columns.items():
         for part, group in {"": named, "_things": thing, "_stuff": named & ~thing}.items():
-            means[name + part] = _mean(values, group)
-            means[f"{name}{part}_present"] = _mean(values, group & present)
+            means[name + part] = mean(values[group])
+            means[f"{name}{part}_present"] = mean(values[group & present])
     return means
-
-
-def _mean(values: Float64[Tensor, "classes"], group: Bool[Tensor, "classes"]) -> float:
-    return float(values[group].mean())
 
 
 def per_class(statistics: PanopticStatistics, class_names: Sequence[str]) -> dict[str, dict[str, float]]:

@@ -8,7 +8,9 @@ from typing import Any
 
 from most.errors import DataError
 from most.files import atomic_write
+from most.metrics.paper_tables import PaperRow
 
+WIDTH = 120  # of a terminal, characters
 COLUMNS = ("pq", "sq", "rq", "iou")
 COUNTS = ("tp", "fp", "fn")
 COMPARED = {
@@ -19,13 +21,6 @@ COMPARED = {
     "membership": "membership_accuracy",
     "contested": "membership_accuracy_contested",
 }
-
-SEQUENCES = {
-    "lstq": {"LSTQ": "lstq", "S_assoc": "s_assoc", "S_cls": "s_cls"},
-    "tracking": {
-        "PAT": "pat", "LSTQ": "lstq", "PTQ": "ptq", "sPTQ": "sptq", "TQ": "tq", "S_assoc": "s_assoc", "S_cls": "s_cls",
-    },
-}  # fmt: skip
 
 
 def write_report(path: Path, report: Mapping[str, Any]) -> None:
@@ -77,13 +72,16 @@ def format_table(panoptic: Mapping[str, Any], things: Collection[str]) -> str:
     return "\n".join(lines)
 
 
-def format_sequences(report: Mapping[str, Any]) -> str:
-    """The 4D figures of a report in percent, SemanticKITTI's or nuScenes'; nothing where it has none."""
-    for section, titles in SEQUENCES.items():
-        if section in report:
-            figures = {title: _percent(report[section].get(key)) for title, key in titles.items()}
-            return "  ".join(f"{title} {figure}" for title, figure in figures.items())
-    return ""
+def format_row(row: PaperRow, width: int = WIDTH) -> str:
+    """A row of the paper's in percent below its columns, as many side by side as lines of ``width`` hold."""
+    blocks: list[tuple[str, str]] = [("", "")]
+    for title, figure in row.figures.items():
+        size = max(len(title), 5) + 2
+        if len(blocks[-1][0]) + size > width:
+            blocks.append(("", ""))
+        head, line = blocks[-1]
+        blocks[-1] = head + f"{title:>{size}}", line + f"{_percent(figure):>{size}}"
+    return "\n".join([row.title, *(text for block in blocks for text in block)])
 
 
 def format_comparison(reports: Mapping[str, Mapping[str, Any]]) -> str:

@@ -5,8 +5,8 @@ from typing import Any
 from jaxtyping import Int64
 from torch import Tensor
 
+from most.datasets.taxonomy import Taxonomy
 from most.metrics.running_tracking import NuScenesLSTQ, PanopticTracking, SemanticKITTILSTQ
-from most.metrics.truth import Taxonomy
 
 
 class SequenceScores:
@@ -16,9 +16,9 @@ class SequenceScores:
         self.taxonomy = taxonomy
         self.numbers: dict[str, int] = {}  # of the sequences
         rules = (taxonomy.class_names, taxonomy.things, taxonomy.min_points)
-        self.is_nuscenes = taxonomy.name == "nuscenes"
-        self.lstq = NuScenesLSTQ(*rules) if self.is_nuscenes else SemanticKITTILSTQ(*rules)
-        self.tracking = PanopticTracking(*rules) if self.is_nuscenes else None
+        is_nuscenes = taxonomy.evaluator == "nuscenes"
+        self.lstq = NuScenesLSTQ(*rules) if is_nuscenes else SemanticKITTILSTQ(*rules)
+        self.tracking = PanopticTracking(*rules) if is_nuscenes else None
 
     def update(
         self,

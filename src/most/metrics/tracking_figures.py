@@ -20,9 +20,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Float64, Int64
 from torch import Tensor
 
+from most.metrics.means import mean
 from most.metrics.panoptic import EPS, class_figures
 from most.metrics.tables import find_rows, sum_rows
 from most.metrics.tracking import TrackingStatistics
@@ -92,19 +93,19 @@ def tracking_figures(statistics: TrackingStatistics, things: Sequence[int]) -> d
     named = torch.ones_like(thing)
     named[0] = False
     present = named & (statistics.panoptic.tp + statistics.panoptic.fn > 0)
-    pq = _mean(panoptic.pq, named)
+    pq = mean(panoptic.pq[named])
     qualities = track_qualities(statistics)
-    tq, tq_repaired = (_mean_track(values) for values in (qualities.official, qualities.repaired))
+    tq, tq_repaired = (mean(values) for values in (qualities.official, qualities.repaired))
     return {
         "pat": _harmonic(pq, tq),
         "pq": pq,
         "tq": tq,
-        "ptq": _mean(tracking.ptq, present),
-        "sptq": _mean(tracking.sptq, present),
-        "ptq_dagger": _mean(torch.where(thing, tracking.ptq, panoptic.iou), named),
-        "motsa": _mean(tracking.motsa, present & thing),
-        "smotsa": _mean(tracking.smotsa, present & thing),
-        "motsp": _mean(tracking.motsp, present & thing),
+        "ptq": mean(tracking.ptq[present]),
+        "sptq": mean(tracking.sptq[present]),
+        "ptq_dagger": mean(torch.where(thing, tracking.ptq, panoptic.iou)[named]),
+        "motsa": mean(tracking.motsa[present & thing]),
+        "smotsa": mean(tracking.smotsa[present & thing]),
+        "motsp": mean(tracking.motsp[present & thing]),
         "tq_repaired": tq_repaired,
         "pat_repaired": 0.0 if pq == tq_repaired == 0 else _harmonic(pq, tq_repaired),
     }
@@ -120,21 +121,13 @@ def tracking_per_class(statistics: TrackingStatistics, class_names: Sequence[str
         name: {
             "ptq": float(tracking.ptq[index]),
             "sptq": float(tracking.sptq[index]),
-            "tq": _mean_track(qualities.official[qualities.classes == index]),
+            "tq": mean(qualities.official[qualities.classes == index]),
             "tracks": int((qualities.classes == index).sum()),
             "switches": int(statistics.switches[index]),
             "soft_switches": float(statistics.soft_switches[index]),
         }
         for index, name in enumerate(class_names[1:], start=1)
     }
-
-
-def _mean(values: Float64[Tensor, "classes"], group: Bool[Tensor, "classes"]) -> float:
-    return float(values[group].mean())
-
-
-def _mean_track(values: Float64[np.ndarray, "tracks"]) -> float:
-    return float(values.mean()) if len(values) else float("nan")
 
 
 def _harmonic(one: float, other: float) -> float:

@@ -7,6 +7,7 @@ Scenes of the official test split go to ``v1.0-test``, without labels and boxes;
 import json
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -18,12 +19,13 @@ from most.errors import DataError
 from most.files import atomic_write
 from most.simulation.boxes import boxes
 from most.simulation.nuscenes_labels import SceneLabels, categories
-from most.simulation.nuscenes_rows import KEY_EVERY, SceneRows, Tables, shared_tables
+from most.simulation.nuscenes_rows import KEY_EVERY, OF_SCENE, SceneRows, Tables, shared_tables
 from most.simulation.sensor import elevations
 from most.simulation.settings import SensorSettings
 from most.simulation.world import Scan, World
 
 FULL, TEST = "v1.0-trainval", "v1.0-test"
+ANEW = "remove the file, and the scene is made anew"
 UNLABELLED = ("panoptic", "lidarseg")  # tables that the test version does not have
 _MAP = bytes.fromhex(  # a grey PNG of one pixel
     "89504e470d0a1a0a0000000d49484452000000010000000108000000003a7e9b55"
@@ -37,24 +39,18 @@ class NuScenesTree:
     def __init__(self, root: Path, made_from: str) -> None:
         """``made_from`` says in JSON what the scenes are made from."""
         self.root, self.made_from = root, json.loads(made_from)
+        self._tables: dict[str, Tables] = {}  # of the scenes whose records were read
 
     def has(self, sequence: str) -> bool:
-        """Whether the scene is finished; a DataError where the tree is another one."""
-        if not self._records():
+        """Whether the scene is finished; a DataError where the tree, or any scene of it, is another one."""
+        if not (self.root / "simulation").is_dir():
             for version in (FULL, TEST):
                 if (self.root / version).exists():
                     raise DataError(
                         f"{self.root / version}: expected no tables or those of simulated scenes, found others; "
                         "choose another out"
                     )
-        record = self._record(sequence)
-        if not record.is_file():
-            return False
-        if json.loads(record.read_text())["made_from"] != self.made_from:
-            raise DataError(
-                f"{record}: expected the settings asked for now, found others; remove {self.root} or choose another out"
-            )
-        return True
+        return sequence in {scene for scene in self._scenes() if self._read(scene)}
 
     def write(self, sequence: str, world: World, scans: Iterable[Scan]) -> None:
         """Write the scene's sweeps, then its labels, then its record."""
@@ -79,8 +75,8 @@ class NuScenesTree:
     def finish(self) -> None:
         """Write the tables, joined from all scenes that are there; those that would stay the same stay untouched."""
         for version in (FULL, TEST):
-            scenes = [path.stem for path in self._records() if version_of(path.stem) == version]
-            parts: list[Tables] = [json.loads(self._record(scene).read_text())["tables"] for scene in scenes]
+            scenes = [scene for scene in self._scenes() if version_of(scene) == version]
+            parts = [self._read(scene) for scene in scenes]
             tables = shared_tables(self.made_from["seed"], scenes) if scenes else {}
             for name in parts[0] if parts else ():
                 tables[name] = [row for part in parts for row in part[name]]
@@ -92,8 +88,37 @@ class NuScenesTree:
     def _record(self, scene: str) -> Path:
         return self.root / "simulation" / f"{scene}.json"
 
-    def _records(self) -> list[Path]:
-        return sorted((self.root / "simulation").glob("scene-*.json"))
+    def _scenes(self) -> list[str]:
+        """The scenes with a record."""
+        return sorted(path.stem for path in (self.root / "simulation").glob("scene-*.json"))
+
+    def _read(self, scene: str) -> Tables:
+        """A finished scene's rows; a DataError for a record of other settings, or a damaged one."""
+        if scene not in self._tables:
+            path = self._record(scene)
+            record = read_record(path)
+            if record["made_from"] != self.made_from:
+                raise DataError(
+                    f"{path}: expected the settings asked for now, found others; remove {self.root} or choose another "
+                    "out: the scenes of a tree share tables"
+                )
+            self._tables[scene] = record["tables"]
+        return self._tables[scene]
+
+
+def read_record(path: Path) -> dict[str, Any]:
+    """What a scene was made from, and its rows; a DataError where the file does not hold them."""
+    try:
+        record = json.loads(path.read_text())
+    except (OSError, ValueError, RecursionError) as error:
+        raise DataError(f"{path}: expected a scene's record, found none ({error}); {ANEW}") from error
+    tables = record.get("tables") if isinstance(record, dict) else None
+    if not isinstance(tables, dict) or "made_from" not in record:
+        raise DataError(f"{path}: expected a scene's made_from and tables, found something else; {ANEW}")
+    for name in OF_SCENE:
+        if not isinstance(tables.get(name), list) or not all(isinstance(row, dict) for row in tables[name]):
+            raise DataError(f"{path}: tables.{name}: expected a list of rows, found something else; {ANEW}")
+    return record
 
 
 def version_of(scene: str) -> str:

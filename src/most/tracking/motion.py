@@ -6,7 +6,7 @@ nothing where the track was seen but once.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import torch
 from jaxtyping import Float64
@@ -19,6 +19,7 @@ SETTLE = 0.5  # s over which velocities told by centres are averaged, since moda
 FASTEST = 10.0  # m/s, standard deviation of a velocity that nothing tells yet
 
 
+@runtime_checkable
 class Motion(Protocol):
     """A model of motion."""
 

@@ -15,8 +15,7 @@ from most.tracking.live import Live, Sightings, canonical_order
 from most.tracking.motion import Motion
 from most.tracking.numbers import Numbers
 
-HALF_SECOND = 0.5  # that gates are given for
-NEAREST_GATE = 0.5  # m; no gate is narrower, however short the time: centres jump as the view changes
+HALF_SECOND = 0.5  # that gates are given for; none is narrower, since modal centres jump however short the time is
 CLOCK = 1e-3  # s by which times of scans are off
 
 
@@ -48,6 +47,8 @@ class Tracker:
         self._check(seen, pose, time)
         self._pose, self._time = self._pose if pose is None else pose.cpu().clone(), time
         self._forget()
+        if not len(seen):
+            return torch.empty_like(seen.classes)
         local = seen.to("cpu")
         order = canonical_order(local)
         numbers = torch.empty_like(local.classes)
@@ -87,8 +88,9 @@ class Tracker:
     def _forget(self) -> None:
         """End the tracks that are lost."""
         keep = self._time - self._live.last_seen <= self.lost_after + CLOCK
-        dead, self._live = self._live.select(~keep), self._live.select(keep)
-        self._numbers.release(_named(dead), _named(self._live))
+        if not keep.all():
+            dead, self._live = self._live.select(~keep), self._live.select(keep)
+            self._numbers.release(_named(dead), _named(self._live))
 
     def _follow(self, seen: Sightings) -> Int64[Tensor, "observations"]:
         """Continue the tracks that are seen again, begin one with each other observation; return their numbers."""
@@ -119,7 +121,7 @@ class Tracker:
         since = self._time - tracks.last_seen
         moved = self.motion.velocities(seen, tracks) * since[:, None]
         away = (seen.centres[:, None] - moved - tracks.centres) @ self._pose[:3, :2]
-        return away.norm(dim=2), (gate * since / HALF_SECOND).clamp(min=NEAREST_GATE)
+        return away.norm(dim=2), gate * (since / HALF_SECOND).clamp(min=1)
 
     def _continue(self, track: Int64[Tensor, "again"], seen: Sightings) -> None:
         before = self._live.select(track)

@@ -1,1 +1,5 @@
-"""Pictures: ``bev.draw_bev`` draws truth, prediction and errors of a scan as seen from above."""
+"""Pictures and recordings.
+
+``bev.draw_bev`` draws truth, prediction and errors of a scan as seen from above; ``scene.write_scene`` writes a
+sequence for the rerun viewer (extra ``viz``, which nothing else here needs).
+"""

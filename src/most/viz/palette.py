@@ -12,6 +12,7 @@ FAINT = "#8b949e"
 RGB = tuple[float, float, float]
 UNCLAIMED = "#ffffff"  # things without an instance
 INSTANCES = ("#f5a623", "#56b4e9", "#2fd6a3", "#f0e442", "#ff7f50", "#f0a0d0", "#b8a1ff", "#a8e05f")  # Okabe and Ito's
+SHADES = (1.0, 0.72, 0.5)  # of those, where there are more instances than colours
 VERDICTS = {
     Verdict.NOT_SCORED: ("not scored", "#21262d"),
     Verdict.RIGHT: ("right", "#56606b"),
@@ -31,6 +32,13 @@ def bright(colour: list[int]) -> RGB:
     """Return a class's own colour (RGB, 0 to 255), lifted until it reads on the dark ground, in [0, 1]."""
     red, green, blue = (0.35 + 0.65 * value / 255 for value in colour)
     return red, green, blue
+
+
+def identity_colour(number: int) -> RGB:
+    """Return the colour of a numbered identity, the same at all times; the first two dozen all differ."""
+    shade = SHADES[number // len(INSTANCES) % len(SHADES)]
+    red, green, blue = to_rgb(INSTANCES[number % len(INSTANCES)])
+    return red * shade, green * shade, blue * shade
 
 
 def numbered(

@@ -48,14 +48,13 @@ class Annotations:
     def boxes(self, sample: str, pose: Float64[Tensor, "4 4"]) -> AmodalBoxes:
         """The boxes of a sample in the frame of a sensor at ``pose`` (world_from_sensor)."""
         rows, path = self._of_sample.get(sample, []), self._annotations.path
-        none = torch.zeros(0, 4, 4, dtype=torch.float64)
-        poses = invert(pose) @ (torch.stack([rigid(row, path) for row in rows]) if rows else none)
-        sizes = [numbers(row, "size", 3, path)[[1, 0, 2]] for row in rows]  # width, length, height in the table
+        poses = invert(pose) @ rigid(rows, path)
+        sizes = numbers(rows, "size", 3, path)[:, [1, 0, 2]]  # width, length, height in the table
         return AmodalBoxes(
             instances=[row["instance_token"] for row in rows],
             categories=torch.tensor([self._category(row) for row in rows], dtype=torch.int64),
             centres=poses[:, :3, 3],
-            half_sizes=torch.stack(sizes) / 2 if rows else none[:, :3, 3],
+            half_sizes=sizes / 2,
             yaws=yaw(poses),
             counts=torch.tensor([row["num_lidar_pts"] for row in rows], dtype=torch.int64),
         )

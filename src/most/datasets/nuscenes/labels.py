@@ -33,7 +33,8 @@ class LabelFiles:
         """All files; none where a version has no such table, as the test's."""
         if not self.table.is_file():
             return {}
-        rows = Table(self.table, {"sample_data_token": str, "filename": str}).rows.values()
+        columns: dict[str, type] = {"sample_data_token": str, "filename": str}
+        rows = Table(self.table, columns, unique=columns).rows.values()
         for row in rows:
             self.scenes.check_sweep(row["sample_data_token"], self.table, row["token"])
         return {row["sample_data_token"]: self.root / row["filename"] for row in rows}

@@ -55,8 +55,8 @@ class PanopticNuScenes:
         self.version = version
         self.splits = splits or SceneSplits()
         self.taxonomy = Taxonomy.load("nuscenes")
-        self.folder = self.root / version  # of the tables
-        self._scenes = Scenes(self.folder)
+        self.place = self.root / version  # holds the tables
+        self._scenes = Scenes(self.place)
         self._annotations = Annotations(self._scenes)
         self._panoptic = LabelFiles(self.root, "panoptic", self._scenes)
         self._lidarseg = LabelFiles(self.root, "lidarseg", self._scenes)
@@ -76,7 +76,7 @@ class PanopticNuScenes:
         for name in present:
             if split != "test" and not self.has_labels(name):
                 raise DataError(
-                    f"{self.folder / 'panoptic.json'}: expected the labels of {name} of the split {split}, found none; "
+                    f"{self.place / 'panoptic.json'}: expected the labels of {name} of the split {split}, found none; "
                     f"add Panoptic nuScenes, or leave the scene out: dataset.splits.{split}=[...]"
                 )
         return present
@@ -139,7 +139,7 @@ class PanopticNuScenes:
         for path in files:
             if not path.is_file():
                 raise DataError(f"{path}: expected a file of {sequence}, found none; copy the tree again")
-        return files + [self.folder / f"{name}.json" for name in TABLES], []
+        return files + [self.place / f"{name}.json" for name in TABLES], []
 
     def prediction_path(self, folder: str | Path, frame: Frame) -> Path:
         """Where a submission keeps its labels of a key frame: ``panoptic/SPLIT/TOKEN_panoptic.npz``."""
@@ -177,9 +177,9 @@ class PanopticNuScenes:
         return self._row(frame).token
 
     def _present(self, split: str, wanted: list[str]) -> list[str]:
-        if not wanted or not self.folder.is_dir():
+        if not wanted or not self.place.is_dir():
             return []
-        return present_sequences(self.folder, split, wanted, self._is_on_disk)
+        return present_sequences(self.place, split, wanted, self._is_on_disk)
 
     def _is_on_disk(self, scene: str) -> bool:
         """Whether a sweep or a label file of any key frame is there: the tables name all scenes."""
@@ -191,7 +191,7 @@ class PanopticNuScenes:
     def _sweeps(self, sequence: str) -> list[LidarSweep]:
         if sequence not in self._scenes.sweeps:
             raise DataError(
-                f"{self.folder / 'scene.json'}: expected the scene {sequence}, found none of that name; "
+                f"{self.place / 'scene.json'}: expected the scene {sequence}, found none of that name; "
                 "it may be of another version: dataset.version"
             )
         return self._scenes.sweeps[sequence]
@@ -200,7 +200,7 @@ class PanopticNuScenes:
         sweeps = self._sweeps(frame.sequence)
         if not 0 <= frame.index < len(sweeps):
             raise DataError(
-                f"{self.folder / 'sample_data.json'}: expected a sweep {frame.index} of {frame.sequence}, "
+                f"{self.place / 'sample_data.json'}: expected a sweep {frame.index} of {frame.sequence}, "
                 f"found {len(sweeps)} sweeps"
             )
         return sweeps[frame.index]
@@ -208,7 +208,7 @@ class PanopticNuScenes:
     def _explain_missing(self, split: str, wanted: list[str]) -> str:
         scenes = f"{', '.join(wanted[:3])} ..." if wanted else f"{self.version} has none"
         return (
-            f"{self.folder}: expected scenes of the split {split} ({scenes}), found none of them.\n"
+            f"{self.place}: expected scenes of the split {split} ({scenes}), found none of them.\n"
             f"The tree holds {self.version}/*.json, samples/LIDAR_TOP, sweeps/LIDAR_TOP and panoptic/{self.version}; "
             "train and val scenes are in dataset.version=v1.0-trainval (or v1.0-mini), test ones in v1.0-test.\n"
             "Point dataset.root or the environment variable NUSCENES_ROOT at the folder that holds them,\n"

@@ -11,7 +11,6 @@ from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 
-import torch
 from jaxtyping import Float64
 from torch import Tensor
 
@@ -64,7 +63,10 @@ class Scenes:
 
     def poses(self, scene: str) -> Float64[Tensor, "sweeps 4 4"]:
         """World_from_sensor of a scene's sweeps."""
-        return torch.stack([self._pose(sweep.token) for sweep in self.sweeps[scene]])
+        rows, asker = [self._sample_data.rows[sweep.token] for sweep in self.sweeps[scene]], self._sample_data.path
+        ego = [self._ego_poses.row(row["ego_pose_token"], asker, row["token"]) for row in rows]
+        mounted = [self._calibrated_sensors.row(row["calibrated_sensor_token"], asker, row["token"]) for row in rows]
+        return rigid(ego, self._ego_poses.path) @ rigid(mounted, self._calibrated_sensors.path)
 
     def check_sample(self, token: str, asker: Path, asking: str) -> None:
         """Raise a DataError unless there is a sample ``token``, which the row ``asking`` of a table names."""
@@ -76,7 +78,7 @@ class Scenes:
 
     @cached_property
     def _scenes(self) -> Table:
-        return Table(self.folder / "scene.json", {"name": str})
+        return Table(self.folder / "scene.json", {"name": str}, unique=("name",))
 
     @cached_property
     def _samples(self) -> Table:
@@ -96,7 +98,7 @@ class Scenes:
         path, mounted = self.folder / "sample_data.json", self._calibrated_sensors
         tokens = [token for token, row in mounted.rows.items() if self._is_lidar(row)]
         lidars, others = set(tokens), set(mounted.rows) - set(tokens)
-        table = Table(path, _SWEEP, lambda row: row.get("calibrated_sensor_token") not in others)
+        table = Table(path, _SWEEP, lambda row: row.get("calibrated_sensor_token") not in others, unique=("filename",))
         for token, row in table.rows.items():
             if row["calibrated_sensor_token"] not in lidars:
                 mounted.row(row["calibrated_sensor_token"], path, token)
@@ -156,9 +158,3 @@ class Scenes:
                     f"{table.path}: row {row['token']!r}: {key}: expected a sweep "
                     f"{'before' if sign < 0 else 'after'} {row['timestamp']}, found {other['timestamp']}"
                 )
-
-    def _pose(self, token: str) -> Float64[Tensor, "4 4"]:
-        row, asker = self._sample_data.rows[token], self._sample_data.path
-        ego = self._ego_poses.row(row["ego_pose_token"], asker, token)
-        mounted = self._calibrated_sensors.row(row["calibrated_sensor_token"], asker, token)
-        return rigid(ego, self._ego_poses.path) @ rigid(mounted, self._calibrated_sensors.path)

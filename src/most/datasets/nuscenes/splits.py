@@ -8,6 +8,7 @@ from pathlib import Path
 import yaml
 
 from most.datasets.reader import SPLITS
+from most.datasets.splits import check_once
 from most.errors import ConfigError
 
 VERSIONS = ("v1.0-mini", "v1.0-trainval", "v1.0-test")
@@ -30,6 +31,7 @@ class SceneSplits:
 
     def __post_init__(self) -> None:
         for split in SPLITS:
+            check_once(split, getattr(self, split) or [])
             for name in getattr(self, split) or []:
                 if not re.fullmatch(r"scene-[0-9]{4}", str(name)):
                     raise ConfigError(

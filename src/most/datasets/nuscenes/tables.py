@@ -1,7 +1,8 @@
 """The JSON tables of one nuScenes version: lists of rows that name one another by tokens."""
 
 import json
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Collection
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -13,15 +14,23 @@ Row = dict[str, Any]
 class Table:
     """The rows of one table by token, each with the columns asked for."""
 
-    def __init__(self, path: Path, columns: dict[str, type], keep: Callable[[Row], bool] = lambda _: True) -> None:
-        """Read ``path``; rows that ``keep`` rejects leave no trace, since the full tables have millions of them."""
+    def __init__(
+        self,
+        path: Path,
+        columns: dict[str, type],
+        keep: Callable[[Row], bool] = lambda _: True,
+        unique: Collection[str] = (),
+    ) -> None:
+        """Read ``path``; rows that ``keep`` rejects leave no trace, since the full tables have millions of them.
+
+        ``unique`` are columns in which, besides the token, no two rows agree.
+        """
         self.path = path
-        self.rows: dict[str, Row] = {}
         self._columns = {"token": str} | columns
-        for row in self._read(keep):
-            if row["token"] in self.rows:
-                raise DataError(f"{path}: expected each token once, found {row['token']} twice; copy the table again")
-            self.rows[row["token"]] = row
+        rows = self._read(keep)
+        for column in ("token", *unique):
+            self._check_unique(rows, column)
+        self.rows = {row["token"]: row for row in rows}
 
     def row(self, token: str, asker: Path, asking: str) -> Row:
         """The row that the row ``asking`` of the table ``asker`` names; a DataError where there is none."""
@@ -31,6 +40,12 @@ class Table:
                 "the tables are incomplete or of different versions: copy all of them again"
             )
         return self.rows[token]
+
+    def _check_unique(self, rows: list[Row], column: str) -> None:
+        """Raise a DataError where an entry occurs twice."""
+        (twice, times), *_ = Counter(row[column] for row in rows).most_common(1) or [("", 0)]
+        if times > 1:
+            raise DataError(f"{self.path}: expected each {column} once, found {twice} twice; copy the table again")
 
     def _read(self, keep: Callable[[Row], bool]) -> list[Row]:
         if not self.path.is_file():
