@@ -1,9 +1,9 @@
 """most.track through the real command: the truth with instances renamed in every scan gets its identities back."""
 
+import math
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 import torch
 
@@ -146,10 +146,16 @@ def test_labels_that_do_not_fit_the_scan_are_refused_by_name(
     assert "Traceback" not in message
 
 
-def test_numbers_of_scans_that_are_late_are_refused_by_name(
+def test_detections_that_are_nowhere_are_refused_by_scan(
     folder: Path, reader: Reader, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    if reader.taxonomy.name == "nuscenes":
-        pytest.skip("its sweeps are sorted by time")
-    np.savetxt(folder / "tree/sequences/08/times.txt", [0.0, 0.2, 0.1, 0.3])
-    assert "08, scan 2: sweep at 0.1 s: expected a time after" in refused(monkeypatch, reader, capsys)
+    path = reader.prediction_path(folder / "mine", reader.frames("val")[1])
+    labels = torch.zeros(len(reader.read_prediction(path)), dtype=torch.int64)
+    labels[:3] = reader.taxonomy.encode(torch.full((3,), CAR), torch.tensor([5, 5, 5]))
+    nowhere = Detections(torch.tensor([CAR]), torch.tensor([0.5]), torch.full((1, 3), math.nan), torch.ones(1, 3),
+                         torch.zeros(1, 2))  # fmt: skip
+    reader.write_prediction(path, labels)
+    write_assignments(assignments_path(path), Assignments(nowhere, torch.ones(1, 3), torch.where(labels > 0, 0, -1)))
+    index = reader.frames("val")[1].index
+    assert f"scan {index}: sweep at" in (message := refused(monkeypatch, reader, capsys))
+    assert "expected finite centres" in message
