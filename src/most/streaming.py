@@ -9,10 +9,11 @@
 
 import time
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 import torch
 from jaxtyping import Float, Float32, Float64, Int64
 from numpy.typing import ArrayLike
@@ -24,8 +25,9 @@ from most.errors import DataError
 from most.inference import Prediction
 from most.relabelling import new_tracker
 from most.structures import Panoptic, Sweep, Tracks
-from most.tracking import Segments, TrackerSettings, observe
+from most.tracking import TrackerSettings, observe
 
+Array = ArrayLike | Tensor
 PERIOD = 0.1  # s between scans whose times are not told
 
 
@@ -75,7 +77,18 @@ class PanopticTracker:
         self._windows = SlidingWindow(self.previous)
         self._scans, self._time = 0, -PERIOD
 
-    def step(self, points: ArrayLike, pose: ArrayLike | None = None, timestamp: float | None = None) -> Step:
+    def state(self) -> dict[str, Any]:
+        """Return all that later scans depend on, in plain types and tensors: ``torch.save`` keeps it."""
+        return {"tracker": self.tracker.state(), "scans": self._scans, "time": self._time} | self._windows.state()
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on from the ``state`` of a tracker of the same model and settings."""
+        self.begin()
+        self.tracker.restore(state["tracker"])
+        self._windows.restore(state)
+        self._scans, self._time = state["scans"], state["time"]
+
+    def step(self, points: Array, pose: Array | None = None, timestamp: float | None = None) -> Step:
         """Label the next scan of the sequence.
 
         ``points``: x, y, z (m, sensor frame, z up) and intensity in [0, 1], N x 4, or without it N x 3. Points that
@@ -86,39 +99,62 @@ class PanopticTracker:
 
         A scan that comes late or is of another shape is a DataError that changes nothing: leave it out and go on.
         """
-        seconds = self._time + PERIOD if timestamp is None else float(timestamp)
-        world = torch.eye(4, dtype=torch.float64) if pose is None else _as_pose(pose)
         if pose is None and self.previous:
             warnings.warn("no pose: the sweeps before are left out of the window", stacklevel=2)
-        begin = time.perf_counter()
-        sweep = Sweep("", self._scans, _as_scan(points), world, seconds, None)
-        window = (SlidingWindow(0) if pose is None else self._windows).window(sweep)
-        accumulated = time.perf_counter() - begin
-        step = self.see(window, posed=pose is not None)
-        if pose is not None:
-            self._windows.add(sweep)
-        self._scans, self._time = self._scans + 1, seconds
-        return replace(step, seconds={"accumulate": accumulated} | step.seconds)
+        sweep, posed = self._sweep(points, pose, timestamp), pose is not None
+        clock = Stopwatch(self.device)
+        window = (self._windows if posed else SlidingWindow(0)).window(sweep)
+        clock.lap("accumulate")
+        step = self.see(window, posed)
+        self._take_in(sweep, posed)
+        return replace(step, seconds=clock.seconds | step.seconds)
 
-    @torch.inference_mode()
+    def recall(
+        self,
+        said: Prediction,
+        points: Array,
+        pose: Array | None = None,
+        timestamp: float | None = None,
+    ) -> None:
+        """Take in the next scan, of which ``step`` said something before: it goes on as if it said it now."""
+        sweep, posed = self._sweep(points, pose, timestamp), pose is not None
+        self.follow(sweep, said, posed)
+        self._take_in(sweep, posed)
+
+    @torch.no_grad()
     def see(self, window: Window, posed: bool = True) -> Step:
-        """Label a sweep whose window is there; ``posed`` says whether its pose is known."""
+        """Label a sweep of the sequence, whose window is there; ``posed`` says whether its pose is known."""
         clock = Stopwatch(self.device)
         evidence = self.predictor.see([window.sample().to(self.device)])[0]
         clock.lap("network")
-        prediction = self.predictor.fuse(evidence).to("cpu")
+        said = self.predictor.fuse(evidence).to("cpu")
         clock.lap("fusion")
-        ids = self.follow(window.sweep, self._segments(window.sweep, prediction), posed)
+        ids = self.follow(window.sweep, said, posed)
         clock.lap("tracking")
-        followed = replace(prediction, panoptic=Panoptic(prediction.panoptic.semantics, ids))
+        followed = replace(said, panoptic=Panoptic(said.panoptic.semantics, ids))
         return Step(followed, evidence.probabilities.amax(1).cpu(), self.tracker.tracks(), clock.seconds)
 
-    def follow(self, sweep: Sweep, segments: Segments, posed: bool = True) -> Int64[Tensor, "points"]:
-        """Find the segments of a sweep among the tracks; return the number of each point's track, 0 for none."""
+    def follow(self, sweep: Sweep, said: Prediction, posed: bool = True) -> Int64[Tensor, "points"]:
+        """Find what is said of a sweep among the tracks; return the number of each point's track, 0 for none.
+
+        The numbers that ``said`` has do not matter: what was followed before gets the same ones again.
+        """
+        if len(said.claimed) != len(sweep.points):
+            raise DataError(f"expected labels of the scan's {len(sweep.points)} points, found {len(said.claimed)}")
+        points, things = sweep.points[:, :3], self.taxonomy.things
+        segments = observe(points, said.panoptic, things, said.detections, said.claimed)
         return segments.rename(self.tracker.step(segments.observations, sweep.pose if posed else None, sweep.time))
 
-    def _segments(self, sweep: Sweep, said: Prediction) -> Segments:
-        return observe(sweep.points[:, :3], said.panoptic, self.taxonomy.things, said.detections, said.claimed)
+    def _sweep(self, points: Array, pose: Array | None, timestamp: float | None) -> Sweep:
+        world = torch.eye(4, dtype=torch.float64) if pose is None else _as_pose(pose)
+        seconds = self._time + PERIOD if timestamp is None else float(timestamp)
+        return Sweep("", self._scans, _as_scan(points), world, seconds, None)
+
+    def _take_in(self, sweep: Sweep, posed: bool) -> None:
+        """Go on to the next scan."""
+        if posed:
+            self._windows.add(sweep)
+        self._scans, self._time = self._scans + 1, sweep.time
 
 
 class Stopwatch:
@@ -139,16 +175,18 @@ class Stopwatch:
         return time.perf_counter()
 
 
-def _as_scan(points: ArrayLike) -> Float32[Tensor, "points 4"]:
+def _as_scan(points: Array) -> Float32[Tensor, "points 4"]:
     """Return x, y, z and intensity, which is 0 where there is none."""
-    scan = np.asarray(points, np.float32)
+    scan = torch.as_tensor(points, dtype=torch.float32)
     if scan.ndim != 2 or scan.shape[1] not in (3, 4):
-        raise DataError(f"points: expected N x 3 (x, y, z) or N x 4 (intensity, too), found shape {scan.shape}")
-    return torch.from_numpy(np.pad(scan, ((0, 0), (0, 4 - scan.shape[1]))))
+        raise DataError(
+            f"points: expected N x 3 (x, y, z) or N x 4 (and intensity), found the shape {tuple(scan.shape)}"
+        )
+    return torch.nn.functional.pad(scan, (0, 4 - scan.shape[1]))
 
 
-def _as_pose(pose: ArrayLike) -> Float64[Tensor, "4 4"]:
-    matrix = np.array(pose, np.float64)
+def _as_pose(pose: Array) -> Float64[Tensor, "4 4"]:
+    matrix = torch.as_tensor(pose, dtype=torch.float64)
     if matrix.shape != (4, 4):
-        raise DataError(f"pose: expected world_from_sensor, 4 x 4, found shape {matrix.shape}")
-    return torch.from_numpy(matrix)
+        raise DataError(f"pose: expected world_from_sensor, 4 x 4, found the shape {tuple(matrix.shape)}")
+    return matrix

@@ -1,7 +1,9 @@
 """A window of sweeps: the current one and those before it, moved into the current sensor frame (paper, section III)."""
 
 from collections import deque
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import torch
 from jaxtyping import Float32
@@ -41,6 +43,15 @@ class SlidingWindow:
     def add(self, sweep: Sweep) -> None:
         """Take in the next sweep."""
         self._before.appendleft(sweep)
+
+    def state(self) -> dict[str, Any]:
+        """Return the sweeps that are kept, without labels, the latest first, in plain types and tensors."""
+        sweeps = [vars(replace(sweep, labels=None)) for sweep in self._before]
+        return {"sweeps": sweeps}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on from what ``state`` returned."""
+        self._before = deque((Sweep(**sweep) for sweep in state["sweeps"]), self.previous)
 
 
 def previous_frames(frames: list[Frame], current: Frame, count: int) -> list[Frame]:
