@@ -8,15 +8,14 @@ import hydra
 import torch
 from omegaconf import MISSING, DictConfig
 
-from most.assembly import check_taxonomy, load_trained
+from most.assembly import load_trained
 from most.config import conf_dir, register, store_root, typed
-from most.datasets.scan_folder import ScanFolderSettings
-from most.datasets.window_stream import WindowStream
+from most.datasets.scan_folder import ScanFolder, ScanFolderSettings
 from most.entry import run, start
 from most.errors import ConfigError
-from most.labelling_scans import describe_scans, label_scans
 from most.membership import Nearest
-from most.predicting import claim_folder, describe_model, describe_split, unfinished, write_predictions
+from most.predicting import describe_model, predict_split
+from most.predicting_scans import predict_scans
 from most.streaming import PanopticTracker
 
 
@@ -58,23 +57,11 @@ def predict(config: PredictConfig) -> None:
     model = PanopticTracker(trained, config.tracker, config.chosen_device())
     described = describe_model(checkpoint, config.nearest, config.tracker)
     if config.input is None:
-        predict_split(config, model, described)
+        reader, ahead = config.dataset.reader(), config.dataset.workers > 0
+        predict_split(model, described, reader, config.split, Path(config.out), ahead)
     else:
         scans = ScanFolder(config.input, config.scans)
-        claim_folder(Path(config.out), described, describe_scans(scans))
-        label_scans(model, scans, Path(config.out))
-
-
-def predict_split(config: PredictConfig, model: PanopticTracker, described: dict[str, Any]) -> None:
-    """Write a dataset's official prediction files."""
-    out, dataset = Path(config.out), config.dataset
-    reader = dataset.reader()
-    check_taxonomy(model.taxonomy, reader.taxonomy)
-    frames = reader.frames(config.split)
-    claim_folder(out, described, describe_split(reader, config.split))
-    frames = unfinished(reader, frames, out)
-    windows = WindowStream(reader, frames, model.previous).load(ahead=dataset.workers > 0)
-    write_predictions(model, windows, reader, out, len(frames))
+        predict_scans(model, described, scans, Path(config.out))
 
 
 @hydra.main(version_base=None, config_path=str(conf_dir()), config_name="predict")

@@ -11,9 +11,11 @@ from jaxtyping import Int64
 from torch import Tensor
 from tqdm import tqdm
 
+from most.assembly import check_taxonomy
 from most.claims import claim
 from most.datasets.reader import Frame, Reader
 from most.datasets.taxonomy import Taxonomy
+from most.datasets.window_stream import WindowStream
 from most.datasets.windows import Window
 from most.errors import named
 from most.inference import Prediction
@@ -23,6 +25,21 @@ from most.structures import Panoptic
 from most.tracking import TrackerSettings
 
 RECORD = "prediction.json"
+
+
+def predict_split(
+    model: PanopticTracker, described: Mapping[str, Any], reader: Reader, split: str, out: Path, ahead: bool
+) -> None:
+    """Write a dataset's official prediction files of a split to ``out``, and go on where that was interrupted.
+
+    ``described`` as by :func:`describe_model`; ``ahead``: sweeps are read in a process of their own.
+    """
+    check_taxonomy(model.taxonomy, reader.taxonomy)
+    frames = reader.frames(split)
+    claim_folder(out, described, describe_split(reader, split))
+    frames = unfinished(reader, frames, out)
+    windows = WindowStream(reader, frames, model.previous).load(ahead)
+    write_predictions(model, windows, reader, out, len(frames))
 
 
 def claim_folder(out: Path, model: Mapping[str, Any], scans: Mapping[str, Any]) -> None:

@@ -8,8 +8,8 @@ from most.assembly import Trained
 from most.datasets.labels import read_labels
 from most.datasets.scan_folder import ScanFolder, ScanFolderSettings
 from most.errors import DataError
-from most.labelling_scans import describe_scans, label_scans
 from most.metrics.assignments import assignments_path, read_assignments
+from most.predicting_scans import describe_scans, label_scans
 from most.streaming import PanopticTracker
 from semantickitti_tree import lidar_pose
 from tiny import TAXONOMY, cloud, tiny_predictor

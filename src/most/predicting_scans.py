@@ -1,5 +1,6 @@
 """Writing predictions of scans that belong to no dataset."""
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,14 @@ from most.datasets.labels import read_labels, write_labels
 from most.datasets.scan_folder import Scan, ScanFolder
 from most.errors import named
 from most.metrics.assignments import assignments_path, write_assignments
-from most.predicting import assignments_of, encode, join_prediction
+from most.predicting import assignments_of, claim_folder, encode, join_prediction
 from most.streaming import PanopticTracker
+
+
+def predict_scans(model: PanopticTracker, described: Mapping[str, Any], scans: ScanFolder, out: Path) -> None:
+    """Label scans in ``out``, and go on where that was interrupted; ``described`` as by ``describe_model``."""
+    claim_folder(out, described, describe_scans(scans))
+    label_scans(model, scans, out)
 
 
 def describe_scans(scans: ScanFolder) -> dict[str, Any]:
