@@ -2,9 +2,9 @@
 
     python benchmarks/stream.py --checkpoint FILE --data FOLDER [--sequence 09] [--scans 1000] [--sweeps 0 10]
 
-FILE is a model that most.train wrote, FOLDER the root of a SemanticKITTI tree, simulated or real. The sequence's scans are
-played forwards, backwards, forwards and so on, a tenth of a second apart: the way of the sensor has no jump. Each number
-of previous sweeps is measured in a process of its own.
+FILE is a model that most.train wrote, FOLDER the root of a SemanticKITTI tree, simulated or real. The sequence's scans
+are played forwards, backwards, forwards and so on, a tenth of a second apart: the way of the sensor has no jump. Each
+number of previous sweeps is measured in a process of its own.
 """
 
 import argparse
