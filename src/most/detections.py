@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -34,7 +34,7 @@ class PeakDetector:
     def __call__(self, maps: BevMaps, things: list[int], grid: BevGrid) -> list[Detections]:
         """Return the detections of each window of a batch; ``things`` are the class ids of the heat map's channels."""
         thing_ids = torch.tensor(things, device=maps.heatmap.device)
-        return [self._detect(_window(maps, index), thing_ids, grid) for index in range(len(maps.heatmap))]
+        return [self._detect(window(maps, index), thing_ids, grid) for index in range(len(maps.heatmap))]
 
     def _detect(self, maps: BevMaps, thing_ids: Tensor, grid: BevGrid) -> Detections:
         """Pick the peaks of one window's maps."""
@@ -45,7 +45,7 @@ class PeakDetector:
         scores, place = scores[scores > 0], place[scores > 0]
         _, width, depth = heat.shape
         channel, x, y = place // (width * depth), place // depth % width, place % depth
-        found = Detections(thing_ids[channel], scores, *_decode(maps, x, y, grid))
+        found = Detections(thing_ids[channel], scores, *decode(maps, x, y, grid))
         return found.select(self._kept(found))
 
     def _kept(self, found: Detections) -> Bool[Tensor, "detections"]:
@@ -60,15 +60,15 @@ class PeakDetector:
         return kept.to(found.scores.device)
 
 
-def _window(maps: BevMaps, index: int) -> BevMaps:
+def window(maps: BevMaps, index: int) -> BevMaps:
     """Return one window's maps, with a batch of one."""
     return BevMaps(**{name: value[index : index + 1].detach() for name, value in vars(maps).items()})
 
 
-def _decode(
-    maps: BevMaps, x: Tensor, y: Tensor, grid: BevGrid
-) -> tuple[Float[Tensor, "detections 3"], Float[Tensor, "detections 3"], Float[Tensor, "detections 2"]]:
-    """Read centres (m), half-sizes (m) and velocities (m/s) off the maps at some cells."""
+def decode(
+    maps: BevMaps, x: Int64[Tensor, "cells"], y: Int64[Tensor, "cells"], grid: BevGrid
+) -> tuple[Float[Tensor, "cells 3"], Float[Tensor, "cells 3"], Float[Tensor, "cells 2"]]:
+    """Read centres (m), half-sizes (m) and velocities (m/s) off one window's maps at some cells."""
     offset, height, extent, velocity = (
         values[0, :, x, y].T.float() for values in (maps.offset, maps.height, maps.extent, maps.velocity)
     )
