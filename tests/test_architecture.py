@@ -27,7 +27,7 @@ COMPONENTS = {
     "simulation": {"datasets"},
 }
 ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw", "submit", "track", "view"}
-OUTER = {"entry", "config", "assembly", "training", "checks"}
+OUTER = {"entry", "config", "assembly", "training", "checks", "streaming", "predicting", "predicting_scans"}
 
 
 def imported(path):

@@ -3,16 +3,26 @@
 import pytest
 import torch
 
+from most.assembly import Trained
 from most.datasets import semantickitti
-from most.datasets.dataset import WindowDataset
-from most.datasets.reader import Frame
 from most.datasets.semantickitti import SemanticKITTI, Splits
+from most.datasets.window_stream import WindowStream
 from most.errors import DataError
 from most.inference import Prediction
-from most.predicting import claim_folder, read_prediction, unfinished, write_prediction, write_predictions
+from most.predicting import (
+    claim_folder,
+    describe_model,
+    describe_split,
+    read_prediction,
+    unfinished,
+    write_prediction,
+    write_predictions,
+)
+from most.streaming import PanopticTracker
 from most.structures import Detections, Panoptic
+from most.tracking import TrackerSettings
 from semantickitti_tree import write_sequence
-from tiny import CAR, PERSON, ROAD, tiny_predictor
+from tiny import CAR, PERSON, ROAD, TAXONOMY, tiny_predictor
 
 ONE_CAR = Detections(
     torch.tensor([CAR]), torch.tensor([0.75]), torch.tensor([[1.0, 2.0, -0.5]]), torch.tensor([[2.0, 1.0, 0.7]]),
@@ -39,9 +49,8 @@ def files(folder):
 
 
 def write_all(reader, frames, out):
-    windows = WindowDataset(reader, frames, previous=1)
-    batches = [[windows[index]] for index in range(len(windows))]
-    write_predictions(tiny_predictor(), batches, reader, out, len(frames), torch.device("cpu"))
+    model = PanopticTracker(Trained(tiny_predictor(), TAXONOMY, 1))
+    write_predictions(model, WindowStream(reader, frames, previous=1), reader, out, len(frames))
 
 
 @pytest.mark.parametrize("prediction", [PREDICTION, NOTHING])
@@ -79,8 +88,8 @@ def test_only_what_is_missing_is_left_to_do(reader, tmp_path):
     assert unfinished(reader, frames, out) == []
     before = {path: (out / path).read_bytes() for path in files(out)}
     reader.prediction_path(out, frames[1]).unlink()
-    assert unfinished(reader, frames, out) == [Frame("08", 1)]
-    write_all(reader, [Frame("08", 1)], out)
+    assert unfinished(reader, frames, out) == frames  # tracks need all of a sequence
+    write_all(reader, frames, out)
     assert {path: (out / path).read_bytes() for path in files(out)} == before
 
 
@@ -110,40 +119,47 @@ def checkpoint(tmp_path):
     return path
 
 
+def claim(out, checkpoint, reader, split, nearest=False, tracker="greedy"):
+    model = describe_model(checkpoint, nearest, TrackerSettings(assignment=tracker))
+    claim_folder(out, model, describe_split(reader, split))
+
+
 def test_the_same_prediction_goes_on_in_its_folder(tmp_path, checkpoint, reader):
     out = tmp_path / "deep" / "out"
     for _ in range(2):
-        claim_folder(out, checkpoint, reader, "val", "trained")
+        claim(out, checkpoint, reader, "val")
     assert files(out) == ["prediction.json"]
     moved = checkpoint.rename(tmp_path / "renamed.ckpt")  # it is the content that counts
-    claim_folder(out, moved, SemanticKITTI(reader.root, reader.splits), "val", "trained")
+    claim(out, moved, SemanticKITTI(reader.root, reader.splits), "val")
 
 
 def test_another_checkpoint_split_or_dataset_is_refused(tmp_path, checkpoint, reader):
     out = tmp_path / "out"
-    claim_folder(out, checkpoint, reader, "val", "trained")
+    claim(out, checkpoint, reader, "val")
     write_sequence(tmp_path / "elsewhere", "08", range(1))
     others = {
         "split": (SemanticKITTI(reader.root, Splits(val=["08"], test=["08"])), "test"),
         "tree": (SemanticKITTI(tmp_path / "elsewhere", reader.splits), "val"),
     }
     for other in others.values():
-        with pytest.raises(DataError, match="of another checkpoint, membership, dataset or split; choose anot"):
-            claim_folder(out, checkpoint, *other, "trained")
+        with pytest.raises(DataError, match="tracker or of other scans; choose another out"):
+            claim(out, checkpoint, *other)
     with pytest.raises(DataError, match="holds predictions of another checkpoint, membership"):
-        claim_folder(out, checkpoint, reader, "val", "nearest")
+        claim(out, checkpoint, reader, "val", nearest=True)
+    with pytest.raises(DataError, match="holds predictions of another checkpoint, membership, tracker"):
+        claim(out, checkpoint, reader, "val", tracker="hungarian")
     checkpoint.write_bytes(b"other weights")
     with pytest.raises(DataError, match="holds predictions of another checkpoint"):
-        claim_folder(out, checkpoint, reader, "val", "trained")
+        claim(out, checkpoint, reader, "val")
 
 
 def test_a_folder_with_other_files_is_refused_untouched(tmp_path, checkpoint, reader):
     out = tmp_path / "out"
     out.mkdir()
-    claim_folder(out, checkpoint, reader, "val", "trained")  # an empty one will do
+    claim(out, checkpoint, reader, "val")  # an empty one will do
     (out / "prediction.json").rename(out / "thesis.txt")
     with pytest.raises(DataError, match="expected a new or empty folder, found other files; choose another out"):
-        claim_folder(out, checkpoint, reader, "val", "trained")
+        claim(out, checkpoint, reader, "val")
     assert files(out) == ["thesis.txt"]
 
 
@@ -151,13 +167,13 @@ def test_what_a_killed_writer_left_is_no_other_content(tmp_path, checkpoint, rea
     out = tmp_path / "out"
     out.mkdir()
     (out / ".prediction.json.x1y2.part").write_text("{")
-    claim_folder(out, checkpoint, reader, "val", "trained")
+    claim(out, checkpoint, reader, "val")
     assert "prediction.json" in files(out)
 
 
 def test_a_file_in_the_folders_place_is_refused(checkpoint, reader):
     with pytest.raises(DataError, match=r"last\.ckpt: expected a new or empty folder, found a file; choose another"):
-        claim_folder(checkpoint, checkpoint, reader, "val", "trained")
+        claim(checkpoint, checkpoint, reader, "val")
 
 
 @pytest.mark.parametrize("content", [b"", b"[]", b"{", b"\xff"])
@@ -166,4 +182,4 @@ def test_a_record_of_another_program_is_refused(tmp_path, checkpoint, reader, co
     out.mkdir()
     (out / "prediction.json").write_bytes(content)
     with pytest.raises(DataError, match="choose another out"):
-        claim_folder(out, checkpoint, reader, "val", "trained")
+        claim(out, checkpoint, reader, "val")

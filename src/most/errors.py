@@ -1,5 +1,8 @@
 """What a user can cause: each message says what, where, what was expected, what was found, and what to do."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class MostError(Exception):
     """Base of all errors a user can put right; entry points print its message alone and exit with this code."""
@@ -22,3 +25,12 @@ class StoppedError(MostError):
         """``exit_code`` is 128 and the number of the signal, as shells report it."""
         super().__init__(message)
         self.exit_code = exit_code
+
+
+@contextmanager
+def named(place: object) -> Iterator[None]:
+    """Say in a DataError of the work within where it happened."""
+    try:
+        yield
+    except DataError as error:
+        raise DataError(f"{place}: {error}") from error

@@ -1,21 +1,22 @@
 """Label a split with a trained model: ``python -m most.predict checkpoint=FILE split=val out=FOLDER``."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import hydra
 import torch
 from omegaconf import MISSING, DictConfig
-from torch.utils.data import DataLoader
 
-from most.assembly import check_taxonomy, load_trained
+from most.assembly import load_trained
 from most.config import conf_dir, register, store_root, typed
-from most.datasets.dataset import WindowDataset
+from most.datasets.scan_folder import ScanFolder, ScanFolderSettings
 from most.entry import run, start
 from most.errors import ConfigError
 from most.membership import Nearest
-from most.predicting import claim_folder, unfinished, write_predictions
+from most.predicting import describe_model, predict_split
+from most.predicting_scans import predict_scans
+from most.streaming import PanopticTracker
 
 
 @dataclass
@@ -26,6 +27,9 @@ class PredictConfig:
     out: str = MISSING
     split: str = "val"
     dataset: Any = None
+    input: str | None = None  # a folder of scans that belongs to no dataset: it is labelled in the dataset's stead
+    scans: ScanFolderSettings = field(default_factory=ScanFolderSettings)  # how those are read
+    tracker: Any = None
     nearest: bool = False  # leave stage 2 out: points go to the nearest centre
     device: str = "auto"  # auto: a GPU where there is one
 
@@ -45,18 +49,19 @@ store_root("predict", PredictConfig)
 
 
 def predict(config: PredictConfig) -> None:
-    """Write the dataset's official prediction files, and detections beside them, to the folder ``out``."""
-    checkpoint, out, dataset = Path(config.checkpoint), Path(config.out), config.dataset
+    """Write labels with the numbers of tracks, and detections beside them, to the folder ``out``."""
+    checkpoint = Path(config.checkpoint)
     trained = load_trained(checkpoint)
-    predictor = replace(trained.predictor, membership=Nearest()) if config.nearest else trained.predictor
-    reader = dataset.reader()
-    check_taxonomy(trained.taxonomy, reader.taxonomy)
-    frames = reader.frames(config.split)
-    claim_folder(out, checkpoint, reader, config.split, "nearest" if config.nearest else "trained")
-    frames = unfinished(reader, frames, out)
-    windows = WindowDataset(reader, frames, trained.sweeps)
-    loader = DataLoader(windows, dataset.batch_size, num_workers=dataset.workers, collate_fn=list)
-    write_predictions(predictor, loader, reader, out, len(frames), config.chosen_device())
+    if config.nearest:
+        trained = replace(trained, predictor=replace(trained.predictor, membership=Nearest()))
+    model = PanopticTracker(trained, config.tracker, config.chosen_device())
+    described = describe_model(checkpoint, config.nearest, config.tracker)
+    if config.input is None:
+        reader, ahead = config.dataset.reader(), config.dataset.workers > 0
+        predict_split(model, described, reader, config.split, Path(config.out), ahead)
+    else:
+        scans = ScanFolder(config.input, config.scans)
+        predict_scans(model, described, scans, Path(config.out))
 
 
 @hydra.main(version_base=None, config_path=str(conf_dir()), config_name="predict")

@@ -11,7 +11,7 @@ from tqdm import tqdm
 from most.claims import claim
 from most.datasets.reader import Frame, Reader
 from most.datasets.taxonomy import Taxonomy
-from most.errors import DataError
+from most.errors import DataError, named
 from most.metrics.assignments import Assignments, assignments_path, read_assignments, write_assignments
 from most.metrics.folders import prediction_paths
 from most.structures import Panoptic, Sweep
@@ -54,10 +54,8 @@ def _write_frame(reader: Reader, frame: Frame, predictions: Path, out: Path, tra
     sweep, labels = reader.sweep(frame), reader.read_prediction(source)
     found = read_assignments(assignments_path(source)) if assignments_path(source).is_file() else None
     segments = _observe(reader.taxonomy, sweep, labels, found, source)
-    try:
+    with named(f"{frame.sequence}, scan {frame.index}"):
         identities = tracker.step(segments.observations, sweep.pose, sweep.time)
-    except DataError as error:
-        raise DataError(f"{frame.sequence}, scan {frame.index}: {error}") from error
     if found is not None:
         write_assignments(assignments_path(path), found)
     reader.write_prediction(path, relabel(reader.taxonomy, labels, segments, identities))

@@ -105,6 +105,18 @@ def test_a_split_without_labels_is_predicted_too(run):
     assert len(list((run / "blind_predictions").rglob("*.label"))) == 3
 
 
+def test_scans_of_no_dataset_are_labelled_too(run):
+    scans = run / "streets/sequences/01/velodyne"
+    done = most(run, "predict", f"checkpoint={MODEL}", f"input={scans}", "out=loose")
+    assert done.returncode == 0, done.stderr
+    for path in sorted(scans.iterdir()):
+        labels = np.fromfile(run / f"loose/predictions/{path.stem}.label", "<u4")
+        assert len(labels) == path.stat().st_size // 16
+    other = most(run, "predict", f"checkpoint={MODEL}", "input=nowhere", "out=none")
+    assert other.returncode == 2
+    assert "nowhere: expected a folder of scans, found none" in other.stderr
+
+
 def test_prediction_goes_on_where_it_stopped_and_refuses_another_models_folder(run):
     arguments = ["split=val", "dataset=simulated", "dataset.root=streets", "dataset.workers=0", *SPLITS]
     assert most(run, "predict", f"checkpoint={MODEL}", "out=again", *arguments).returncode == 0

@@ -1,12 +1,57 @@
 """A window of sweeps: the current one and those before it, moved into the current sensor frame (paper, section III)."""
 
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
 import torch
 from jaxtyping import Float32
 from torch import Tensor
 
 from most.datasets.reader import Frame
 from most.geometry.poses import relative, transform
-from most.structures import Sweep
+from most.structures import OnDevice, Sample, Sweep
+
+
+@dataclass
+class Window(OnDevice):
+    """A sweep, and its points with those of the sweeps before it."""
+
+    sweep: Sweep
+    points: Float32[Tensor, "points 5"]  # see :func:`gather_window`
+
+    def sample(self) -> Sample:
+        """What a network is given of it: no truth."""
+        sweep = self.sweep
+        return Sample(sweep.sequence, sweep.index, self.points, len(sweep.points), None, None, None)
+
+
+class SlidingWindow:
+    """Makes windows of sweeps as they come; those that no later window reaches are forgotten."""
+
+    def __init__(self, previous: int) -> None:
+        """``previous`` counts sweeps before the current one."""
+        self.previous = previous
+        self._before: deque[Sweep] = deque(maxlen=previous)
+
+    def window(self, sweep: Sweep) -> Window:
+        """Return the window of the next sweep, which is not taken in."""
+        near = [other for other in self._before if other.index >= sweep.index - self.previous]
+        return Window(sweep, gather_window(sweep, near))
+
+    def add(self, sweep: Sweep) -> None:
+        """Take in the next sweep."""
+        self._before.appendleft(sweep)
+
+    def state(self) -> dict[str, Any]:
+        """Return the sweeps that are kept, without labels, the latest first, in plain types and tensors."""
+        sweeps = [vars(replace(sweep, labels=None)) for sweep in self._before]
+        return {"sweeps": sweeps}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on from what ``state`` returned."""
+        self._before = deque((Sweep(**sweep) for sweep in state["sweeps"]), self.previous)
 
 
 def previous_frames(frames: list[Frame], current: Frame, count: int) -> list[Frame]:
