@@ -34,7 +34,7 @@ class PeakDetector:
     def __call__(self, maps: BevMaps, things: list[int], grid: BevGrid) -> list[Detections]:
         """Return the detections of each window of a batch; ``things`` are the class ids of the heat map's channels."""
         thing_ids = torch.tensor(things, device=maps.heatmap.device)
-        return [self._detect(window(maps, index), thing_ids, grid) for index in range(len(maps.heatmap))]
+        return [self._detect(_window(maps, index), thing_ids, grid) for index in range(len(maps.heatmap))]
 
     def _detect(self, maps: BevMaps, thing_ids: Tensor, grid: BevGrid) -> Detections:
         """Pick the peaks of one window's maps."""
@@ -60,7 +60,7 @@ class PeakDetector:
         return kept.to(found.scores.device)
 
 
-def window(maps: BevMaps, index: int) -> BevMaps:
+def _window(maps: BevMaps, index: int) -> BevMaps:
     """Return one window's maps, with a batch of one."""
     return BevMaps(**{name: value[index : index + 1].detach() for name, value in vars(maps).items()})
 

@@ -7,19 +7,14 @@ from typing import Any
 import hydra
 import torch
 from omegaconf import DictConfig
-from torch.utils.data import DataLoader
-from tqdm import tqdm
 
 from most.assembly import check_taxonomy, load_trained
 from most.config import conf_dir, register, store_root, typed
-from most.datasets.dataset import WindowDataset
 from most.datasets.instances import InstanceTables
-from most.datasets.reader import Reader
+from most.datasets.taxonomy import Taxonomy
 from most.entry import run, start
-from most.errors import DataError
 from most.inference import Inference
-from most.ladder import Ladder, ModelLook, NoModel, format_ladder
-from most.ladder.looks import Look
+from most.ladder import Ladder, Look, ModelLook, NoModel, check_labels, climb, format_ladder
 from most.metrics.report import write_report
 
 
@@ -41,34 +36,29 @@ register()
 store_root("oracle", OracleConfig)
 
 
-def look_of(config: OracleConfig, reader: Reader) -> tuple[Look, int]:
+def look_of(config: OracleConfig, taxonomy: Taxonomy, device: torch.device) -> tuple[Look, int]:
     """Return what looks at the sweeps, and how many previous ones it needs."""
     if config.checkpoint is None:
-        return NoModel(config.grid, config.inference, reader.taxonomy.num_classes), 0
+        return NoModel(config.grid, config.inference, taxonomy.num_classes), 0
     trained = load_trained(Path(config.checkpoint))
-    check_taxonomy(trained.taxonomy, reader.taxonomy)
+    check_taxonomy(trained.taxonomy, taxonomy)
+    for module in trained.predictor.modules().values():
+        module.to(device)
     return ModelLook(trained.predictor), trained.sweeps
 
 
-@torch.inference_mode()
 def oracle(config: OracleConfig) -> None:
-    """Write every rung's report to ``out`` and print their main figures."""
+    """Write every row's report to ``out`` and print the main figures."""
     dataset, reader = config.dataset, config.dataset.reader()
-    look, previous = look_of(config, reader)
-    frames = reader.frames(config.split)
+    device = torch.device("cuda" if config.checkpoint and torch.cuda.is_available() else "cpu")
+    look, previous = look_of(config, reader.taxonomy, device)
+    check_labels(reader, config.split)
     tables = InstanceTables(reader, config.extent, dataset.tables)
-    for sequence in reader.sequences(config.split):
-        if not reader.has_labels(sequence):
-            raise DataError(f"split={config.split}: expected labels, found none of {sequence}; choose another split")
-        tables.table(sequence)
-    windows = WindowDataset(reader, frames, previous, instances=tables)
-    loader = DataLoader(windows, dataset.batch_size, num_workers=dataset.workers, collate_fn=list)
-    ladder = Ladder(reader, look, config.tracker)
-    for samples in tqdm(loader, "oracle", unit="batch"):
-        ladder.add(samples)
-    rungs = ladder.report()
-    write_report(Path(config.out), {"scans": len(frames), "checkpoint": config.checkpoint, "rungs": rungs})
-    print(format_ladder(rungs))
+    ladder = Ladder(reader.taxonomy, tables, look, config.tracker, device)
+    climb(ladder, reader, config.split, previous, ahead=dataset.workers > 0)
+    rows = ladder.report()
+    write_report(Path(config.out), {"checkpoint": config.checkpoint, "rows": rows})
+    print(format_ladder(rows))
 
 
 @hydra.main(version_base=None, config_path=str(conf_dir()), config_name="oracle")

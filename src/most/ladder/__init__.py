@@ -5,8 +5,8 @@ and ``rungs`` say which at a time. ``climb`` labels, tracks and scores every swe
 predicts, and ``ceilings`` scores the truth against itself.
 """
 
-from most.ladder.climb import Ladder
-from most.ladder.looks import ModelLook, NoModel
+from most.ladder.climb import Ladder, check_labels, climb
+from most.ladder.looks import Look, ModelLook, NoModel
 from most.ladder.table import format_ladder
 
-__all__ = ["Ladder", "ModelLook", "NoModel", "format_ladder"]
+__all__ = ["Ladder", "Look", "ModelLook", "NoModel", "check_labels", "climb", "format_ladder"]

@@ -15,6 +15,8 @@ from torch import Tensor
 from most.datasets.taxonomy import Taxonomy
 from most.metrics.sequences import LabelScores
 
+CEILING = "ceiling"  # how the names of these rows begin
+
 Points = Int64[Tensor, "points"]
 Renumber = Callable[[Points, Points], Points]  # training ids and raw labels -> labels
 
@@ -45,7 +47,7 @@ def ceilings(taxonomy: Taxonomy) -> list[Ceiling]:
     def by_instance(_: Points, labels: Points) -> Points:
         return numbered(taxonomy.raw_table_size, code.class_of(labels), labels)
 
-    renumbers: dict[str, Renumber] = {"ceiling: the truth": lambda _, labels: labels}
+    renumbers: dict[str, Renumber] = {f"{CEILING}: the truth": lambda _, labels: labels}
     if code.unique_in == "sequence":
-        renumbers |= {"ceiling: its tubes": by_tube, "ceiling: its instances": by_instance}
+        renumbers |= {f"{CEILING}: its tubes": by_tube, f"{CEILING}: its instances": by_instance}
     return [Ceiling(name, taxonomy, renumber) for name, renumber in renumbers.items()]

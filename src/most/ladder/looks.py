@@ -5,19 +5,18 @@ from typing import Protocol, runtime_checkable
 
 import torch
 
-from most.detections import window
 from most.inference import Inference, Predictor
 from most.ladder.scene import Scene
 from most.membership import Evidence, Nearest, match_detections
-from most.structures import Detections, Sample
-from most.voxels import BevGrid, Grid
+from most.structures import Detections, Instances, Sample
+from most.voxels import Grid
 
 BEV_STRIDE = 8  # voxels along the side of a BEV cell, of backbones with four levels
 
 
 @runtime_checkable
 class Look(Protocol):
-    """Looks at sweeps that have a truth."""
+    """Looks at sweeps whose truth is known."""
 
     has_model: bool
 
@@ -31,8 +30,8 @@ class Look(Protocol):
         """How detections and points become labels."""
         ...
 
-    def __call__(self, samples: list[Sample]) -> list[Scene]:
-        """Return what is seen of each current sweep."""
+    def __call__(self, sample: Sample, instances: Instances) -> Scene:
+        """Return what is seen of the current sweep, which has these instances."""
         ...
 
 
@@ -54,16 +53,12 @@ class ModelLook:
         """The model's."""
         return self.predictor.settings
 
-    def __call__(self, samples: list[Sample]) -> list[Scene]:
-        """Run stage 1 on a batch of windows."""
-        output = self.predictor.network(samples)
-        scenes = []
-        for index, (sample, seen) in enumerate(zip(samples, self.predictor.read(output, samples), strict=True)):
-            assert sample.instances is not None
-            roi = self.settings.roi.half_sizes(seen.detections.extents)
-            owners = match_detections(seen.detections, roi, sample.instances)
-            scenes.append(Scene(seen, window(output.maps, index), owners, self.predictor.membership))
-        return scenes
+    def __call__(self, sample: Sample, instances: Instances) -> Scene:
+        """Run stage 1; detections stand for the instances that training would match them with."""
+        output = self.predictor.network([sample])
+        (seen,) = self.predictor.read(output, [sample])
+        owners = match_detections(seen.detections, self.settings.roi.half_sizes(seen.detections.extents), instances)
+        return Scene(seen, output.maps, owners, self.predictor.membership)
 
 
 @dataclass
@@ -76,20 +71,19 @@ class NoModel:
 
     has_model = False
 
-    def __call__(self, samples: list[Sample]) -> list[Scene]:
+    def __call__(self, sample: Sample, instances: Instances) -> Scene:
         """Return evidence of nothing."""
-        return [Scene(self._nothing(sample), None, torch.zeros(0, dtype=torch.long), Nearest()) for sample in samples]
+        return Scene(self._nothing(sample), None, instances.keys[:0], Nearest())
 
     def _nothing(self, sample: Sample) -> Evidence:
-        points = sample.points[: sample.num_current, :3]
-        grid: BevGrid = self.grid.bev(BEV_STRIDE)
-        whole, rows = torch.zeros(0, dtype=torch.long), points.new_zeros(0, 3)
+        points, grid = sample.points[: sample.num_current, :3], self.grid.bev(BEV_STRIDE)
+        void, rows = torch.zeros(len(points), dtype=torch.long), points[:0]
         return Evidence(
             points=points,
-            semantics=torch.zeros(len(points), dtype=torch.long),
+            semantics=void,
             probabilities=points.new_zeros(len(points), self.num_classes - 1),
             point_features=points.new_zeros(len(points), 0),
             bev=points.new_zeros(0, *grid.shape),
             bev_grid=grid,
-            detections=Detections(whole, points.new_zeros(0), rows, rows, rows[:, :2]),
+            detections=Detections(void[:0], rows[:, 0], rows, rows, rows[:, :2]),
         )

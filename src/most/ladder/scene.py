@@ -24,13 +24,13 @@ class Truth:
     instances: Instances
 
     @staticmethod
-    def of(sample: Sample, grid: Grid, taxonomy: Taxonomy) -> "Truth":
-        """Read the truth off a sample that has one."""
-        assert sample.labels is not None
-        assert sample.semantics is not None
-        assert sample.instances is not None
-        by_voxel = voxel_majority(sample, sample.semantics, grid, taxonomy.num_classes)
-        return Truth(sample.labels, sample.semantics, by_voxel, sample.instances)
+    def of(
+        sample: Sample, labels: Int64[Tensor, "points"], instances: Instances, grid: Grid, taxonomy: Taxonomy
+    ) -> "Truth":
+        """Gather what labels and instances say of the current sweep."""
+        semantics = taxonomy.to_training(labels, f"{sample.sequence}, scan {sample.index}")
+        by_voxel = voxel_majority(sample, semantics, grid, taxonomy.num_classes)
+        return Truth(labels, semantics, by_voxel, instances)
 
 
 @dataclass
@@ -38,7 +38,7 @@ class Scene:
     """One sweep as far as detections, and how its points will be given to them."""
 
     evidence: Evidence
-    maps: BevMaps | None  # of this window alone; None where no model looked
+    maps: BevMaps | None  # batch of one; None where no model looked
     owners: Int64[Tensor, "detections"]  # the instance of the truth that each detection stands for, -1 for none
     membership: Membership
 

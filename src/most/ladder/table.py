@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from most.ladder.ceilings import CEILING
 from most.ladder.rungs import EVERYTHING, MODEL
 
 PANOPTIC = {"PQ": "pq", "PQ Th": "pq_things", "mIoU": "miou"}
@@ -11,13 +12,14 @@ SEQUENCES = {"LSTQ": "lstq", "LSTQ rep.": "lstq_repaired", "PAT": "pat", "PAT re
 Figures = dict[str, float]
 
 
-def format_ladder(rungs: Mapping[str, Mapping[str, Any]]) -> str:
-    """Figures of every rung in percent; below, the differences to everything substituted, and to the model as it is."""
-    rows = {name: _figures(report) for name, report in rungs.items()}
-    blocks = [_block("", rows)]
-    for reference, title in {EVERYTHING: "minus everything", MODEL: "minus the model"}.items():
-        if reference in rows:
-            blocks.append(_block(title, {name: _minus(row, rows[reference]) for name, row in rows.items()}, "+"))
+def format_ladder(rows: Mapping[str, Mapping[str, Any]]) -> str:
+    """Figures of every row in percent; below, how far rungs are from everything substituted and from the model."""
+    table = {name: _figures(report) for name, report in rows.items()}
+    blocks = [_block("", table)]
+    for end in (EVERYTHING, MODEL):
+        if end in table:
+            others = [name for name in table if name != end and not name.startswith(CEILING)]
+            blocks.append(_block(f"minus {end}", {name: _minus(table[name], table[end]) for name in others}, "+"))
     return "\n\n".join(blocks)
 
 
