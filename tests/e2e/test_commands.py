@@ -165,7 +165,8 @@ def test_the_oracle_ladder_stands_on_a_model_or_on_none(run):
     none, model = (json.loads((run / f"{name}.json").read_text())["rows"] for name in ("none", "ladder"))
     assert none["everything"] == model["everything"]
     assert none["everything"]["panoptic"]["miou"] == none["ceiling: the truth"]["panoptic"]["miou"]
-    assert none["everything"]["lstq"]["lstq"] >= 0.99 * none["ceiling: its instances"]["lstq"]["lstq"]
+    top, ceiling = (none[name]["lstq"]["lstq"] for name in ("everything", "ceiling: its instances"))
+    assert 0.98 * ceiling <= top <= ceiling  # of two bicycles of a point each one takes the other's track
     assert {"the model", "only centres", "all but extents"} <= model.keys() - none.keys()
 
 
