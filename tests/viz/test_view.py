@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from commands import Forked, most
+from commands import Command, most
 from most.datasets.reader import Frame
 from most.datasets.semantickitti import SemanticKITTI, SemanticKITTISettings, Splits
 from most.errors import ConfigError, DataError
@@ -247,7 +247,7 @@ def test_the_command_writes_a_recording(tree):
 def test_a_recording_that_a_full_disk_cuts_off_is_refused_and_goes(tree):
     needs_rerun()
     arguments = ["predictions=predictions", "sequence='08'", "out=new/a.rrd", "dataset.root=tree"]
-    done = Forked(tree, "view", *arguments, largest_file=10_000).done()
+    done = Command(tree, "view", *arguments, largest_file=10_000).done()
     assert done.returncode == 2
     assert "expected room for a whole recording, found it cut off" in done.stderr
     assert list((tree / "new").iterdir()) == []
