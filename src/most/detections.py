@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -45,7 +45,7 @@ class PeakDetector:
         scores, place = scores[scores > 0], place[scores > 0]
         _, width, depth = heat.shape
         channel, x, y = place // (width * depth), place // depth % width, place % depth
-        found = Detections(thing_ids[channel], scores, *_decode(maps, x, y, grid))
+        found = Detections(thing_ids[channel], scores, *decode(maps, x, y, grid))
         return found.select(self._kept(found))
 
     def _kept(self, found: Detections) -> Bool[Tensor, "detections"]:
@@ -65,10 +65,10 @@ def _window(maps: BevMaps, index: int) -> BevMaps:
     return BevMaps(**{name: value[index : index + 1].detach() for name, value in vars(maps).items()})
 
 
-def _decode(
-    maps: BevMaps, x: Tensor, y: Tensor, grid: BevGrid
-) -> tuple[Float[Tensor, "detections 3"], Float[Tensor, "detections 3"], Float[Tensor, "detections 2"]]:
-    """Read centres (m), half-sizes (m) and velocities (m/s) off the maps at some cells."""
+def decode(
+    maps: BevMaps, x: Int64[Tensor, "cells"], y: Int64[Tensor, "cells"], grid: BevGrid
+) -> tuple[Float[Tensor, "cells 3"], Float[Tensor, "cells 3"], Float[Tensor, "cells 2"]]:
+    """Read centres (m), half-sizes (m) and velocities (m/s) off one window's maps at some cells."""
     offset, height, extent, velocity = (
         values[0, :, x, y].T.float() for values in (maps.offset, maps.height, maps.extent, maps.velocity)
     )

@@ -55,7 +55,10 @@ class Predictor:
 
     def see(self, samples: list[Sample]) -> list[Evidence]:
         """Return what stage 1 says of each current sweep, up to the detections."""
-        output = self.network(samples)
+        return self.read(self.network(samples), samples)
+
+    def read(self, output: NetworkOutput, samples: list[Sample]) -> list[Evidence]:
+        """Return the same from what the network said of the samples."""
         found = self.settings.detector(output.maps, self.things, self.network.bev_grid)
         classified = classify(output, samples, self.network.grid, self.fallback)
         return [

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from most.errors import ConfigError
 from most.membership import Evidence, Pairs, RegionOfInterest
-from most.structures import Detections, Panoptic
+from most.structures import Detections, OnDevice, Panoptic
 
 MEMBER = 0.5  # a pair belongs together above this confidence (Algorithm 1, line 10)
 UNCLAIMED = ("nearest", "cluster", "zero")
@@ -51,7 +51,7 @@ class Fusion:
 
 
 @dataclass
-class Assignment:
+class Assignment(OnDevice):
     """Points and the centres that claim them, before and after the unclaimed are dealt with."""
 
     claimed: Int64[Tensor, "points"]  # index of the detection whose member the point is, -1 for none

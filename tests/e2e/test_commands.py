@@ -152,3 +152,33 @@ def test_a_missing_dataset_is_one_message_before_any_work(tmp_path):
     for hint in ("nowhere/sequences", "velodyne", "most.simulate"):
         assert hint in done.stderr
     assert not (tmp_path / "run" / "checkpoints").exists()
+
+
+def test_the_oracle_ladder_stands_on_a_model_or_on_none(run):
+    arguments = ["split=val", "dataset=simulated", "dataset.root=streets", "dataset.tables=tables", "dataset.workers=0",
+                 "dataset.min_points=0", *SPLITS]  # fmt: skip
+    for told in (["out=none.json"], ["out=ladder.json", f"checkpoint={MODEL}"]):
+        done = most(run, "oracle", *told, *arguments)
+        assert done.returncode == 0, done.stderr
+        assert "everything, semantics by voxel" in done.stdout
+        assert all(len(line) <= 120 for line in done.stdout.splitlines())
+    none, model = (json.loads((run / f"{name}.json").read_text())["rows"] for name in ("none", "ladder"))
+    assert none["everything"] == model["everything"]
+    assert none["everything"]["panoptic"]["miou"] == none["ceiling: the truth"]["panoptic"]["miou"]
+    top, ceiling = (none[name]["lstq"]["lstq"] for name in ("everything", "ceiling: its instances"))
+    assert 0.98 * ceiling <= top <= ceiling  # of two bicycles of a point each one takes the other's track
+    assert {"the model", "only centres", "all but extents"} <= model.keys() - none.keys()
+
+
+def test_the_models_rung_is_what_predict_and_evaluate_say(run):
+    arguments = ["split=val", "dataset=simulated", "dataset.root=streets", "dataset.workers=0", *SPLITS]
+    assert (
+        most(run, "oracle", f"checkpoint={MODEL}", "out=as_is.json", "dataset.tables=tables", *arguments).returncode
+        == 0
+    )
+    assert most(run, "predict", f"checkpoint={MODEL}", "out=as_is", *arguments).returncode == 0
+    assert most(run, "evaluate", "predictions=as_is", "out=evaluated.json", *arguments).returncode == 0
+    rung = json.loads((run / "as_is.json").read_text())["rows"]["the model"]
+    report = json.loads((run / "evaluated.json").read_text())
+    assert rung["lstq"] == report["lstq"]
+    assert rung["panoptic"] == {key: report["panoptic"][key] for key in rung["panoptic"]}

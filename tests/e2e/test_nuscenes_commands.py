@@ -46,6 +46,17 @@ def test_predictions_are_scored_with_the_devkits_figures(folder: Path) -> None:
     assert all(len(line) <= 120 for line in done.stdout.splitlines())
 
 
+def test_the_oracle_ladder_has_the_devkits_figures(folder: Path) -> None:
+    done = most(folder, "oracle", *TREE, "grid=nuscenes", "dataset.tables=tables", "dataset.workers=0",
+                "dataset.min_points=0", "out=ladder.json")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    rows = json.loads((folder / "ladder.json").read_text())["rows"]
+    top, ceiling = rows["everything"], rows["ceiling: the truth"]
+    assert top["panoptic"]["pq"] == ceiling["panoptic"]["pq"]
+    assert top["tracking"]["pat"] >= 0.99 * ceiling["tracking"]["pat"]
+    assert "PAT rep." in done.stdout
+
+
 @pytest.mark.parametrize(("split", "version"), [("val", "v1.0-trainval"), ("test", "v1.0-test")])
 def test_predictions_are_packaged_as_the_server_expects(folder: Path, split: str, version: str) -> None:
     told = [

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import nuscenes_tree
 from commands import SPLITS, TINY, Command
 from semantickitti_tree import write_sequence
 
@@ -105,6 +106,33 @@ def test_a_broken_dataset_is_refused_by_name(folder: Path, fault: str, workers: 
     damage(folder / "tree" / "sequences" / "00")
     message = refused(folder, "train", *TRAIN, f"dataset.workers={workers}")
     assert all(word in message for word in words), message
+
+
+ORACLE = ["dataset=simulated", "dataset.root=tree", "dataset.tables=tables", "dataset.workers=0", *SPLITS]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["checkpoint=no.ckpt"], ["no.ckpt: expected a checkpoint, found no file"]),
+        (["split=test"], ["split=test: expected labels, found none of 11", "choose another split"]),
+        (["split=all"], ["split", "train, val, test"]),
+        (["dataset.root=nowhere"], ["nowhere/sequences", "most.simulate"]),
+        (["inference.roi.margin=0"], ["inference.roi.margin: expected a positive number, found 0"]),
+    ],
+)
+def test_a_ladder_that_cannot_stand_is_refused(folder: Path, arguments: list[str], words: list[str]) -> None:
+    write_sequence(folder / "tree", "11", range(2), labelled=False)
+    message = refused(folder, "oracle", *ORACLE, *arguments)
+    assert all(word in message for word in words), message
+    assert not (folder / "oracle.json").exists()
+    assert not (folder / "tables").exists()
+
+
+def test_a_ladder_is_not_put_up_against_a_model_of_other_classes(folder: Path, checkpoint: Path) -> None:
+    nuscenes_tree.write_tree(folder / "nuscenes", {"scene-0003": True})
+    message = refused(folder, "oracle", "dataset=nuscenes", "dataset.root=nuscenes", f"checkpoint={checkpoint}")
+    assert "expected one of semantickitti, which the model knows, found one of nuscenes" in message
 
 
 @pytest.mark.parametrize("command", ["predict", "train"])

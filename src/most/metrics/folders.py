@@ -15,8 +15,7 @@ from most.errors import DataError
 from most.metrics.assignments import assignments_path, read_assignments
 from most.metrics.instances import find_instances
 from most.metrics.membership import MembershipCounts, membership_counts
-from most.metrics.panoptic import PanopticStatistics, panoptic_figures, panoptic_statistics, per_class
-from most.metrics.sequences import SequenceScores
+from most.metrics.sequences import LabelScores
 
 
 def evaluate_folder(reader: Reader, frames: Sequence[Frame], folder: Path, progress: bool = True) -> dict[str, Any]:
@@ -41,8 +40,7 @@ class _Scores:
 
     def __init__(self, reader: Reader, with_memberships: bool) -> None:
         self.reader, self.taxonomy = reader, reader.taxonomy
-        self.panoptic = PanopticStatistics.zeros(len(self.taxonomy.class_names))
-        self.sequences = SequenceScores(self.taxonomy)
+        self.labels = LabelScores(self.taxonomy)
         self.memberships = MembershipCounts() if with_memberships else None
 
     def add(self, frame: Frame, path: Path) -> None:
@@ -55,20 +53,17 @@ class _Scores:
             )
         known = self.taxonomy.to_training(truth, "truth of " + str(path))
         semantics = self.taxonomy.decode(labels, path)
-        size, smallest = len(self.taxonomy.class_names), self.taxonomy.min_points
-        self.panoptic += panoptic_statistics(semantics, labels, known, truth, size, smallest)
-        self.sequences.update(frame.sequence, semantics, labels, known, truth)
+        self.labels.update(frame.sequence, semantics, labels, known, truth)
         if self.memberships is not None:
             points = self.reader.sweep(frame).points[:, :3]
             self.memberships += _memberships(assignments_path(path), points, semantics, truth, known, self.taxonomy)
 
     def report(self) -> dict[str, Any]:
         """Return all sections."""
-        figures: dict[str, Any] = dict(panoptic_figures(self.panoptic, self.taxonomy.things))
+        report = self.labels.report()
         unknown = {"membership_accuracy": None, "membership_accuracy_contested": None}
-        figures |= unknown if self.memberships is None else self.memberships.accuracies()
-        classes = {"per_class": per_class(self.panoptic, self.taxonomy.class_names)}
-        return {"panoptic": figures | classes} | self.sequences.report()
+        report["panoptic"] |= unknown if self.memberships is None else self.memberships.accuracies()
+        return report
 
 
 def prediction_paths(reader: Reader, frames: Sequence[Frame], folder: Path) -> list[Path]:

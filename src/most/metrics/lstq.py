@@ -5,12 +5,15 @@
     LSTQ    = sqrt(S_assoc S_cls)
 
 The official S_assoc may exceed 1: a tube may share more points than its size says, and SemanticKITTI's sums over
-tubes of stuff too, but divides by those of things alone. Its figures keep their names; beside them stand those
-with ``_repaired``, which count what is shared as sizes are counted, and things alone. Without a tube both are NaN.
+tubes of stuff too, but divides by those of things alone. Nor does it give 1 to the truth itself: in scans where a
+true tube has too few points to count, they count for the predicted one. Its figures keep their names; beside them
+stand those with ``_repaired``, which count what is shared as sizes are counted, things alone, and such points on
+neither side. Without a tube both are NaN.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -20,7 +23,16 @@ from most.metrics.panoptic import EPS, PointCounts
 from most.metrics.tables import find_rows, sum_rows
 from most.metrics.tubes import TubeStatistics
 
-OFFICIAL, AS_SIZES = 4, 5  # columns of the overlaps: all shared points, or those that predicted sizes count
+
+class Columns(NamedTuple):
+    """Which counts are compared."""
+
+    shared: int  # of the overlaps
+    sizes: int  # of the predicted tubes
+
+
+OFFICIAL = Columns(shared=4, sizes=2)  # all shared points; all points of the predicted tube
+REPAIRED = Columns(shared=5, sizes=3)  # those that predicted sizes count; those that true tubes could count
 
 
 @dataclass
@@ -37,15 +49,15 @@ class Association:
         return ratio(float(self.sums.sum()), int(self.tubes[list(things)].sum()))
 
 
-def associate(statistics: TubeStatistics, column: int = OFFICIAL) -> Association:
-    """Compare predicted and true tubes, sharing points as counted in a column of the overlaps."""
+def associate(statistics: TubeStatistics, columns: Columns = OFFICIAL) -> Association:
+    """Compare predicted and true tubes by some of their counts."""
     truth, pred = sum_rows(statistics.truth, 3), sum_rows(statistics.pred, 2)
     overlaps = sum_rows(statistics.overlaps, 4)
     truth_of = find_rows(truth[:, :3], overlaps[:, :3])
     pred_of = find_rows(pred[:, :2], overlaps[:, [0, 3]])
-    pairs = (pred_of >= 0) & (overlaps[:, column] > 0)
-    truth_of, pred_of, shared = truth_of[pairs], pred_of[pairs], overlaps[pairs, column].astype(np.float64)
-    true_size, pred_size = truth[truth_of, 3], pred[pred_of, 2]
+    pairs = (pred_of >= 0) & (overlaps[:, columns.shared] > 0)
+    truth_of, pred_of, shared = truth_of[pairs], pred_of[pairs], overlaps[pairs, columns.shared].astype(np.float64)
+    true_size, pred_size = truth[truth_of, 3], pred[pred_of, columns.sizes]
     quality = shared * shared / (true_size + pred_size - shared) / true_size
     classes, of_pair, size = truth[:, 1], truth[truth_of, 1], len(statistics.confusion)
     return Association(
@@ -108,7 +120,7 @@ def _repaired_association(statistics: TubeStatistics, things: Sequence[int]) -> 
     """The association of true tubes of things alone, sharing points as sizes count them."""
     truth = statistics.truth[np.isin(statistics.truth[:, 1], list(things))]
     overlaps = statistics.overlaps[np.isin(statistics.overlaps[:, 1], list(things))]
-    return associate(TubeStatistics(statistics.confusion, truth, statistics.pred, overlaps), AS_SIZES)
+    return associate(TubeStatistics(statistics.confusion, truth, statistics.pred, overlaps), REPAIRED)
 
 
 def _lstq(s_assoc: float, s_cls: float, repaired: float) -> dict[str, float]:

@@ -31,7 +31,7 @@ class _LSTQ(TableMetric):
         size = len(self.class_names)
         self.add_state("confusion", default=torch.zeros(size, size, dtype=torch.int64), dist_reduce_fx="sum")
         self.add_table("truth", keys=3, amounts=1)
-        self.add_table("pred", keys=2, amounts=1)
+        self.add_table("pred", keys=2, amounts=2)
         self.add_table("overlaps", keys=4, amounts=2)
 
     def update(

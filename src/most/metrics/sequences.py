@@ -1,4 +1,4 @@
-"""What a dataset's own 4D evaluator says of whole sequences (paper, Table V)."""
+"""What a dataset's own evaluators say of whole sequences: 4D figures (paper, Table V), and all figures of labels."""
 
 from typing import Any
 
@@ -6,6 +6,7 @@ from jaxtyping import Int64
 from torch import Tensor
 
 from most.datasets.taxonomy import Taxonomy
+from most.metrics.panoptic import PanopticStatistics, panoptic_figures, panoptic_statistics, per_class
 from most.metrics.running_tracking import NuScenesLSTQ, PanopticTracking, SemanticKITTILSTQ
 
 
@@ -43,3 +44,31 @@ class SequenceScores:
         if self.tracking is None:
             return {"lstq": lstq | {"per_class": self.lstq.per_class()}}
         return {"tracking": lstq | self.tracking.compute() | {"per_class": self.tracking.per_class()}}
+
+
+class LabelScores:
+    """All figures that labels alone decide; scans of a sequence are added in the order of time."""
+
+    def __init__(self, taxonomy: Taxonomy) -> None:
+        self.taxonomy = taxonomy
+        self.panoptic = PanopticStatistics.zeros(taxonomy.num_classes)
+        self.sequences = SequenceScores(taxonomy)
+
+    def update(
+        self,
+        sequence: str,
+        semantics: Int64[Tensor, "points"],
+        labels: Int64[Tensor, "points"],
+        truth_semantics: Int64[Tensor, "points"],
+        truth_labels: Int64[Tensor, "points"],
+    ) -> None:
+        """Add a scan; labels are whole, as they are on disk."""
+        size, smallest = self.taxonomy.num_classes, self.taxonomy.min_points
+        self.panoptic += panoptic_statistics(semantics, labels, truth_semantics, truth_labels, size, smallest)
+        self.sequences.update(sequence, semantics, labels, truth_semantics, truth_labels)
+
+    def report(self) -> dict[str, Any]:
+        """Return the section ``panoptic`` with ``per_class``, and that of the 4D figures beside it."""
+        figures: dict[str, Any] = dict(panoptic_figures(self.panoptic, self.taxonomy.things))
+        classes = {"per_class": per_class(self.panoptic, self.taxonomy.class_names)}
+        return {"panoptic": figures | classes} | self.sequences.report()

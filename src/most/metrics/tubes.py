@@ -46,7 +46,7 @@ class TubeStatistics:
 
     confusion: Int64[Tensor, "classes classes"]  # indexed [predicted, truth], void included
     truth: Int64[np.ndarray, "truth 4"]  # sequence, class, id, points
-    pred: Int64[np.ndarray, "pred 3"]  # sequence, id, points
+    pred: Int64[np.ndarray, "pred 4"]  # sequence, id, points, those that no true tube is too small for in their scan
     overlaps: Int64[np.ndarray, "pairs 6"]  # sequence, class, true id, predicted id, points, those in the pred's size
 
 
@@ -56,17 +56,19 @@ def tube_statistics(overlaps: Overlaps, sequence: int, rules: TubeRules, num_cla
     ``sequence`` numbers the sequence: tubes of different sequences are never the same. A predicted tube is an id,
     whatever its classes; a true one is a class and an id. The official evaluators count all points that a true tube
     shares with an id, but for the size of the id only those predicted as certain classes (and, for nuScenes, where
-    they are enough in the scan), so that a tube may share more than it has: ``overlaps`` has both counts.
+    they are enough in the scan), so that a tube may share more than it has: ``overlaps`` has both counts. They count
+    points for that size whose true tube is too small in the scan to grow by them: ``pred`` has both counts.
     """
     known = overlaps.known
     truth = known.truth
-    tubes = among(truth.classes, rules.truth_classes) & _is_instance(truth.keys, rules)
-    tubes &= known.truth_areas > rules.min_points
+    instances = among(truth.classes, rules.truth_classes) & _is_instance(truth.keys, rules)
+    tubes = instances & (known.truth_areas > rules.min_points)
 
     ids, id_of_segment = renumber(known.pred.keys)
     id_of = id_of_segment[known.pred_of]
     counted = np.where(among(known.pred.classes, rules.pred_classes)[known.pred_of], known.points, 0)
     sizes = totals(id_of, counted, len(ids))
+    fair = totals(id_of, np.where((instances & ~tubes)[known.truth_of], 0, counted), len(ids))
     seen = _is_instance(ids, rules) & (sizes > rules.pred_min_points)
 
     shared = tubes[known.truth_of] & _is_instance(ids, rules)[id_of]
@@ -75,7 +77,7 @@ def tube_statistics(overlaps: Overlaps, sequence: int, rules: TubeRules, num_cla
     return TubeStatistics(
         confusion=confusion_of(overlaps, num_classes),
         truth=table(sequence, truth.classes[tubes], truth.keys[tubes], known.truth_areas[tubes]),
-        pred=table(sequence, ids[seen], sizes[seen]),
+        pred=table(sequence, ids[seen], sizes[seen], fair[seen]),
         overlaps=table(sequence, truth.classes[truth_of], truth.keys[truth_of], ids[id_of], points, of_size),
     )
 

@@ -1,0 +1,71 @@
+"""What each stage costs: ``python -m most.oracle checkpoint=FILE split=val out=oracle.json``."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import hydra
+import torch
+from omegaconf import DictConfig
+
+from most.assembly import check_taxonomy, load_trained
+from most.config import conf_dir, register, store_root, typed
+from most.datasets.instances import InstanceTables
+from most.datasets.taxonomy import Taxonomy
+from most.entry import run, start
+from most.inference import Inference
+from most.ladder import Ladder, Look, ModelLook, NoModel, check_labels, climb, format_ladder
+from most.metrics.report import write_report
+
+
+@dataclass
+class OracleConfig:
+    """What ``most.oracle`` is told."""
+
+    checkpoint: str | None = None  # null: no model, the truth is everywhere
+    out: str = "oracle.json"
+    split: str = "val"
+    dataset: Any = None
+    extent: Any = None  # the truth's extents
+    tracker: Any = None
+    grid: Any = None  # of the voxels; a checkpoint has its own
+    inference: Inference = field(default_factory=Inference)  # a checkpoint has its own
+
+
+register()
+store_root("oracle", OracleConfig)
+
+
+def look_of(config: OracleConfig, taxonomy: Taxonomy, device: torch.device) -> tuple[Look, int]:
+    """Return what looks at the sweeps, and how many previous ones it needs."""
+    if config.checkpoint is None:
+        return NoModel(config.grid, config.inference, taxonomy.num_classes), 0
+    trained = load_trained(Path(config.checkpoint))
+    check_taxonomy(trained.taxonomy, taxonomy)
+    for module in trained.predictor.modules().values():
+        module.to(device)
+    return ModelLook(trained.predictor), trained.sweeps
+
+
+def oracle(config: OracleConfig) -> None:
+    """Write every row's report to ``out`` and print the main figures."""
+    dataset, reader = config.dataset, config.dataset.reader()
+    device = torch.device("cuda" if config.checkpoint and torch.cuda.is_available() else "cpu")
+    look, previous = look_of(config, reader.taxonomy, device)
+    check_labels(reader, config.split)
+    tables = InstanceTables(reader, config.extent, dataset.tables)
+    ladder = Ladder(reader.taxonomy, tables, look, config.tracker, device)
+    climb(ladder, reader, config.split, previous, ahead=dataset.workers > 0)
+    rows = ladder.report()
+    write_report(Path(config.out), {"checkpoint": config.checkpoint, "rows": rows})
+    print(format_ladder(rows))
+
+
+@hydra.main(version_base=None, config_path=str(conf_dir()), config_name="oracle")
+def main(config: DictConfig) -> None:
+    """Compose, check, climb."""
+    run(lambda: oracle(typed(config)))
+
+
+if __name__ == "__main__":
+    start(main)
