@@ -35,7 +35,8 @@ SIMULATE = [
     "simulation.sensor.columns=256",
 ]  # fmt: skip
 TRAIN = ["+experiment=sim_demo", "dataset.root=streets", "dataset.tables=tables", *SPLITS, *TINY]
-PRELOADED = [f"most.{command}" for command in ("train", "predict", "evaluate", "simulate", "submit", "compare", "draw")]
+COMMANDS = ("train", "predict", "track", "evaluate", "compare", "submit", "simulate", "draw", "oracle")
+PRELOADED = [f"most.{command}" for command in COMMANDS]
 
 
 @dataclass

@@ -12,6 +12,7 @@ from most.errors import MostError
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 NO_RIGHT = (errno.EROFS, errno.EACCES, errno.EPERM)
+NO_PLACE = (errno.EISDIR, errno.ENOTDIR, errno.EEXIST)  # a folder where a file is to be, or a file on the way
 
 
 def start(main: Callable[[], None]) -> None:
@@ -35,7 +36,7 @@ def run(task: Callable[[], None]) -> None:
     except MostError as error:
         _end(_message(error), error.exit_code)
     except OSError as error:
-        advice = {**dict.fromkeys(NO_ROOM, "make room"), **dict.fromkeys(NO_RIGHT, "choose another place")}
+        advice = {**dict.fromkeys(NO_ROOM, "make room"), **dict.fromkeys(NO_RIGHT + NO_PLACE, "choose another place")}
         if error.errno not in advice:
             raise
         place = error.filename or "an output file"

@@ -1,10 +1,12 @@
 """Writing predictions of scans that belong to no dataset."""
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import torch
 from tqdm import tqdm
 
 from most.datasets.labels import read_labels, write_labels
@@ -24,7 +26,10 @@ def predict_scans(model: PanopticTracker, described: Mapping[str, Any], scans: S
 def describe_scans(scans: ScanFolder) -> dict[str, Any]:
     """Return which scans there are and how they are read, in plain types."""
     names = [path.name for path in scans.paths]
-    return {"input": str(scans.folder.resolve()), "scans": names, "read": asdict(scans.settings)}
+    where = torch.zeros(0) if scans.poses is None else scans.poses
+    travel = hashlib.sha256(where.numpy().tobytes() + scans.times.numpy().tobytes()).hexdigest()
+    settings = {key: value for key, value in asdict(scans.settings).items() if key not in ("poses", "times")}
+    return {"input": str(scans.folder.resolve()), "scans": names, "read": settings, "poses_and_times_sha256": travel}
 
 
 def label_scans(model: PanopticTracker, scans: ScanFolder, out: Path) -> None:

@@ -35,7 +35,7 @@ def write_tracks(reader: Reader, split: str, predictions: Path, out: Path, setti
     prediction_paths(reader, frames, predictions)
     content = {
         "predictions": str(predictions.resolve()),
-        "dataset": str(Path(reader.root).resolve()),
+        "dataset": str(reader.place.resolve()),
         "split": split,
         "sequences": reader.sequences(split),
         "tracker": asdict(settings),

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from most.assembly import Trained, load_trained
+from most.datasets.kitti_files import check_rigid
 from most.datasets.windows import SlidingWindow, Window
 from most.errors import DataError
 from most.inference import Prediction
@@ -109,6 +110,10 @@ class PanopticTracker:
         self._take_in(sweep, posed)
         return replace(step, seconds=clock.seconds | step.seconds)
 
+    def accumulate(self, points: Array, pose: Array, timestamp: float | None = None) -> None:
+        """Take in the next sweep unlabelled: one between those that are asked about, which only fills windows."""
+        self._take_in(self._sweep(points, pose, timestamp), posed=True)
+
     def recall(
         self,
         said: Prediction,
@@ -148,6 +153,9 @@ class PanopticTracker:
     def _sweep(self, points: Array, pose: Array | None, timestamp: float | None) -> Sweep:
         world = torch.eye(4, dtype=torch.float64) if pose is None else _as_pose(pose)
         seconds = self._time + PERIOD if timestamp is None else float(timestamp)
+        self.tracker.check(None if pose is None else world, seconds)  # before the network's work
+        if seconds <= self._time:
+            raise DataError(f"sweep at {seconds} s: expected a time after the last sweep's {self._time} s")
         return Sweep("", self._scans, _as_scan(points), world, seconds, None)
 
     def _take_in(self, sweep: Sweep, posed: bool) -> None:
@@ -177,7 +185,7 @@ class Stopwatch:
 
 def _as_scan(points: Array) -> Float32[Tensor, "points 4"]:
     """Return x, y, z and intensity, which is 0 where there is none."""
-    scan = torch.as_tensor(points, dtype=torch.float32)
+    scan = torch.as_tensor(points).to("cpu", torch.float32, copy=True)  # the caller may use its memory again
     if scan.ndim != 2 or scan.shape[1] not in (3, 4):
         raise DataError(
             f"points: expected N x 3 (x, y, z) or N x 4 (and intensity), found the shape {tuple(scan.shape)}"
@@ -186,7 +194,11 @@ def _as_scan(points: Array) -> Float32[Tensor, "points 4"]:
 
 
 def _as_pose(pose: Array) -> Float64[Tensor, "4 4"]:
-    matrix = torch.as_tensor(pose, dtype=torch.float64)
+    matrix = torch.as_tensor(pose).to("cpu", torch.float64, copy=True)
     if matrix.shape != (4, 4):
         raise DataError(f"pose: expected world_from_sensor, 4 x 4, found the shape {tuple(matrix.shape)}")
+    if bool(matrix.isfinite().all()):
+        check_rigid("pose", matrix[None])
+        if matrix[3].tolist() != [0, 0, 0, 1]:
+            raise DataError(f"pose: expected 0 0 0 1 in the last row, found {matrix[3].tolist()}; is it transposed?")
     return matrix

@@ -221,7 +221,8 @@ def test_poses_of_tum_bring_their_times(tmp_path):
         (IDENTITY + "1 2\n", r"poses\.txt, line 2: expected 12 finite"),
         (IDENTITY.replace("1", "2") * 2, r"poses\.txt: expected rotations"),
         ("0 0 0 0 0 0 0 0\n" * 2, r"poses\.txt: expected a quaternion .* row 0"),
-        ("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", r"poses\.txt: expected times that ascend"),
+        ("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", r"poses\.txt, scan 1: expected a time after 2 s, found 1 s"),
+        ("1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", r"poses\.txt, scan 1: expected a time after 1 s, found 1 s"),
     ],
 )
 def test_poses_that_do_not_fit_are_refused(tmp_path, content, message):

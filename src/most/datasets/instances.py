@@ -1,7 +1,6 @@
 """The modal instances of any frame of a dataset: one cached table a sequence, and one extent strategy over them."""
 
 import hashlib
-from dataclasses import asdict
 from pathlib import Path
 
 from most.datasets.reader import Frame, Reader
@@ -33,7 +32,8 @@ class InstanceTables:
 
     def _load_or_build(self, sequence: str) -> InstanceTable:
         frames, taxonomy = self.reader.key_frames(sequence), self.reader.taxonomy
-        meaning = {key: value for key, value in asdict(taxonomy).items() if key not in ("min_points", "evaluator")}
+        label = (taxonomy.label.high, taxonomy.label.step)
+        meaning = {"raw_ids": taxonomy.raw_ids, "things": taxonomy.things, "label": label}  # what a table depends on
         made_from = fingerprint(*self.reader.sources(sequence), meaning)
         rules = LabelRules(taxonomy.to_training, taxonomy.is_thing, taxonomy.instance_of, self.reader.max_gap)
         path = self.folder / self._tree() / f"{sequence}.npz"

@@ -102,8 +102,12 @@ class ScanFolder:
         if self.settings.times is not None:
             times = read_rows(Path(self.settings.times), 1)[:, 0]
             self._check_count(self.settings.times, len(times), "times")
-        if bool((times[1:] < times[:-1]).any()):
-            raise DataError(f"{self.settings.times or self.settings.poses}: expected times that ascend, found others")
+        if late := (times[1:] <= times[:-1]).nonzero().flatten().tolist():
+            file, row = self.settings.times or self.settings.poses, late[0] + 1
+            raise DataError(
+                f"{file}, scan {row}: expected a time after {times[row - 1]:g} s, found {times[row]:g} s; give each "
+                "scan its own time, in seconds"
+            )
         return poses, times
 
     def _check_count(self, file: str, found: int, what: str) -> None:

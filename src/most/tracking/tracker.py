@@ -22,7 +22,8 @@ CLOCK = 1e-3  # s by which times of scans are off
 class Tracker:
     """Follows the things of one sequence; what it says of a sweep depends on no later one.
 
-    Nothing depends on the order of observations, but between equal ones. Memory grows with the live tracks alone.
+    Nothing depends on the order of observations, but between equal ones. Memory grows with the live tracks, and the
+    numbers of dead ones, which are as many as labels have room for at most.
     """
 
     def __init__(
@@ -44,7 +45,9 @@ class Tracker:
         taken to stand still. A sweep that comes late, or what is not finite, is a DataError that changes nothing:
         the sweep may be left out, and the next one goes on.
         """
-        self._check(seen, pose, time)
+        self.check(pose, time)
+        if not bool(seen.centres.isfinite().all() & seen.velocities[seen.velocity_known].isfinite().all()):
+            raise DataError(f"sweep at {time} s: expected finite centres and velocities, found others; leave them out")
         self._pose, self._time = self._pose if pose is None else pose.cpu().clone(), time
         self._forget()
         if not len(seen):
@@ -74,7 +77,8 @@ class Tracker:
         self._live = Live(**{field.name: state[field.name].clone() for field in fields(Live)})
         self._pose, self._time = state["pose"].clone(), float(state["time"])
 
-    def _check(self, seen: Observations, pose: Tensor | None, time: float) -> None:
+    def check(self, pose: Float64[Tensor, "4 4"] | None, time: float) -> None:
+        """Raise the DataError that ``step`` would, were it told this pose and time next."""
         if not (math.isfinite(time) and time > self._time):
             raise DataError(
                 f"sweep at {time} s: expected a time after the last sweep's {self._time} s; leave late sweeps out, "
@@ -82,8 +86,6 @@ class Tracker:
             )
         if pose is not None and not bool(pose.isfinite().all()):
             raise DataError(f"sweep at {time} s: expected a finite pose, found {pose.tolist()}; leave it out, or None")
-        if not bool(seen.centres.isfinite().all() & seen.velocities[seen.velocity_known].isfinite().all()):
-            raise DataError(f"sweep at {time} s: expected finite centres and velocities, found others; leave them out")
 
     def _forget(self) -> None:
         """End the tracks that are lost."""
