@@ -26,7 +26,7 @@ COMPONENTS = {
     "metrics": {"datasets", "membership"},
     "simulation": {"datasets"},
 }
-ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw", "submit", "track", "view"}
+ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw", "submit", "track", "velocity", "view"}
 OUTER = {"entry", "config", "assembly", "training", "checks"}
 
 
