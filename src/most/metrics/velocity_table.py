@@ -41,6 +41,8 @@ def _errors(errors: Mapping[str, Any]) -> list[list[str]]:
 
 
 def _error(each: Mapping[str, float]) -> list[str]:
+    if not each["objects"]:
+        return ["0", "-", "-", "-"]
     ratio = each["predicted"] / each["zero"]
     return [str(each["objects"]), *(f"{number:.2f}" for number in (each["predicted"], each["zero"], ratio))]
 
