@@ -4,10 +4,11 @@ TORCH ?= torch==2.13.0# pinned first: left to pip, torch brings gigabytes of CUD
 VENV ?= .venv
 DEVKIT ?= .devkit
 DEMO ?= demo
+VELOCITY ?= velocity
 RUN = $(VENV)/bin/python
 READY = $(VENV)/.ready
 
-.PHONY: setup devkit demo test lint bench clean
+.PHONY: setup devkit demo velocity test lint bench clean
 
 setup: $(READY)
 
@@ -43,6 +44,21 @@ demo: setup
 	$(RUN) -m most.compare 'reports={nearest: $(DEMO)/nearest.json, full: $(DEMO)/metrics.json}'
 	@echo "tables: above, in $(DEMO)/metrics.json and $(DEMO)/nearest.json; picture: $(DEMO)/sweep.png"
 
+TRAFFIC = dataset=traffic dataset.root=$(VELOCITY)/traffic dataset.tables=$(VELOCITY)/tables
+LEARNED = $(VELOCITY)/run/checkpoints/detection-last.ckpt
+
+# Do predicted velocities help to track at 2 Hz? What is finished is skipped, so that an interrupted run goes on.
+velocity: setup
+	$(RUN) -m most.simulate simulation=traffic out=$(VELOCITY)/traffic
+	test -f $(VELOCITY)/run/metrics.json || $(RUN) -m most.train +experiment=sim_velocity $(TRAFFIC) \
+	  hydra.run.dir=$(VELOCITY)/run $$(test ! -f $(LEARNED) || echo resume=$(LEARNED))
+	$(RUN) -m most.predict checkpoint=$(LEARNED) split=test out=$(VELOCITY)/predictions $(TRAFFIC)
+	for motion in velocity nearest; do \
+	  $(RUN) -m most.track predictions=$(VELOCITY)/predictions split=test out=$(VELOCITY)/$$motion \
+	    tracker.motion=$$motion $(TRAFFIC) || exit; done
+	$(RUN) -m most.velocity velocity=$(VELOCITY)/velocity nearest=$(VELOCITY)/nearest split=test \
+	  out=$(VELOCITY)/velocity.json $(TRAFFIC)
+
 # Real scans, where there are any: MOST_REAL_DATA=FOLDER make test (FOLDER holds semantickitti/sequences/NN and nuscenes).
 test: setup
 	OMP_NUM_THREADS=1 $(RUN) -m pytest -n 2 --dist worksteal --jaxtyping-packages=most,shapes.checked
@@ -57,4 +73,4 @@ bench: setup
 	$(RUN) benchmarks/network.py
 
 clean:
-	rm -rf $(VENV) $(DEVKIT) $(DEMO) build dist outputs multirun .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(DEVKIT) $(DEMO) $(VELOCITY) build dist outputs multirun .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -35,7 +35,7 @@ SIMULATE = [
     "simulation.sensor.columns=256",
 ]  # fmt: skip
 TRAIN = ["+experiment=sim_demo", "dataset.root=streets", "dataset.tables=tables", *SPLITS, *TINY]
-COMMANDS = ("train", "predict", "track", "evaluate", "compare", "submit", "simulate", "draw", "oracle")
+COMMANDS = ("train", "predict", "track", "evaluate", "compare", "submit", "simulate", "draw", "oracle", "velocity")
 PRELOADED = [f"most.{command}" for command in COMMANDS]
 
 

@@ -26,7 +26,19 @@ COMPONENTS = {
     "metrics": {"datasets", "membership"},
     "simulation": {"datasets"},
 }
-ENTRY_POINTS = {"train", "predict", "evaluate", "compare", "simulate", "draw", "submit", "track", "view", "oracle"}
+ENTRY_POINTS = {
+    "train",
+    "predict",
+    "evaluate",
+    "compare",
+    "simulate",
+    "draw",
+    "submit",
+    "track",
+    "velocity",
+    "view",
+    "oracle",
+}
 OUTER = {"entry", "config", "assembly", "training", "checks", "streaming", "predicting", "predicting_scans"}
 
 

@@ -24,9 +24,9 @@ def test_raw_features_of_two_points_worked_out_by_hand():
     voxels = voxelise([window(points)], GRID)
     described, raw = describe(torch.tensor(points), voxels, GRID)
     assert torch.allclose(described[0, :3], torch.tensor([0.25 / 8, 0.5 / 8, 0.5 / 4]))
-    assert torch.allclose(described[0, 3:5], torch.tensor([0.3, -0.1]))
+    assert torch.allclose(described[0, 3:5], torch.tensor([0.3, -0.4]))
     assert torch.allclose(described[0, 6:], torch.tensor([-0.25, 0.0, 0.0, -0.25, 0.0, 0.0]))
-    assert torch.allclose(raw[0], torch.tensor([0.0, 0.0, 0.0, 0.5, 0.4, math.log(2)]))
+    assert torch.allclose(raw[0], torch.tensor([0.0, 0.0, 0.0, 0.5, 0.4, -0.2, math.log(2)]))
 
 
 def test_points_do_not_depend_on_their_order():

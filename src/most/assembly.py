@@ -19,7 +19,7 @@ from most.network import Network
 from most.panoptic import Membership
 from most.voxels import Grid
 
-FORMAT = 2
+FORMAT = 3
 KEYS = ("most_run", "state_dict")  # beside "most", which describes the model: what it was trained with, its weights
 GROUPS = ("grid", "encoder", "backbone", "centre_head", "semantic_head", "membership", "inference")
 

@@ -14,7 +14,8 @@ from most.structures import Voxels
 from most.voxels import Grid
 
 POINT_CHANNELS = 12  # position 3, intensity, time, distance, offsets from the voxel's mean 3 and middle 3
-VOXEL_CHANNELS = 6  # the raw mean: offset of the mean from the middle 3, height, intensity, log count
+VOXEL_CHANNELS = 7  # the raw mean: offset of the mean from the middle 3, height, intensity, time, log count
+MOMENT = 0.25  # s that ages are counted in; in seconds they would be too small to be heard beside the rest
 
 
 @dataclass
@@ -75,17 +76,17 @@ def point_counts(voxels: Voxels, dtype: torch.dtype) -> Float[Tensor, "voxels"]:
 
 def describe(
     points: Float[Tensor, "inputs 5"], voxels: Voxels, grid: Grid
-) -> tuple[Float[Tensor, "inputs 12"], Float[Tensor, "voxels 6"]]:
+) -> tuple[Float[Tensor, "inputs 12"], Float[Tensor, "voxels 7"]]:
     """Return the raw features of points and of voxels, scaled to about one."""
     size, reach = points.new_tensor(grid.voxel_size), points.new_tensor(grid.upper)
     middles = grid.middles(voxels.coordinates[:, 1:])
-    means = voxel_mean(points[:, :4], voxels)
+    xyz, rest = points[:, :3], torch.cat([points[:, 3:4], points[:, 4:] / MOMENT], 1)
+    means = voxel_mean(torch.cat([xyz, rest], 1), voxels)
     index = voxels.point_voxel
-    xyz = points[:, :3]
     described = torch.cat(
         [
             xyz / reach,
-            points[:, 3:],
+            rest,
             xyz[:, :2].norm(dim=1, keepdim=True) / reach[0],
             (xyz - means[index, :3]) / size,
             ((xyz - middles[index]) / size).clamp(-2, 2),  # points clipped into the border layers lie further off

@@ -19,6 +19,7 @@ REQUIRED = {
     "submit": ["predictions=a"],
     "view": ["predictions=a", "sequence='08'"],
     "track": ["predictions=a", "out=b"],
+    "velocity": ["velocity=a", "nearest=b"],
 }
 
 

@@ -5,6 +5,7 @@ instance kept its predicted key from one scan to the next. TQ matches instances 
 follows every instance as a track over the whole sequence.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -57,7 +58,7 @@ def tracking_statistics(
     The keys of ``overlaps`` are whole labels; ``sequence`` numbers the sequence. Points of void truth count nowhere.
     """
     known = overlaps.known
-    matches = _thing_matches(known, rules)
+    matches = thing_matches(known, rules.things)
     switches, soft_switches = _switches(memory.matches, matches, rules.num_classes)
 
     regardless = known.by_predicted_key()
@@ -76,10 +77,10 @@ def tracking_statistics(
     return statistics, TrackMemory(memory.labels | labels, matches)
 
 
-def _thing_matches(known: Overlaps, rules: TrackingRules) -> dict[Track, tuple[int, float]]:
-    """The true positives of things: predicted key and IoU."""
+def thing_matches(known: Overlaps, things: Collection[int]) -> dict[Track, tuple[int, float]]:
+    """The true positives of things, by instance: predicted key and IoU. ``known`` has no points of void truth."""
     match = true_positives(known)
-    match = match.where(among(known.truth.classes[match.truth], rules.things))
+    match = match.where(among(known.truth.classes[match.truth], things))
     classes, keys = known.truth.classes[match.truth].tolist(), known.truth.keys[match.truth].tolist()
     found = zip(known.pred.keys[match.pred].tolist(), match.iou.tolist(), strict=True)
     return dict(zip(zip(classes, keys, strict=True), found, strict=True))
