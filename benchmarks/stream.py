@@ -13,10 +13,10 @@ import subprocess
 import sys
 import time
 from itertools import chain, cycle, islice
-from pathlib import Path
 
 import numpy as np
 import torch
+from network import peak_memory
 
 import most.network
 from most.datasets.semantickitti import SemanticKITTI
@@ -60,12 +60,6 @@ def watch_voxelising() -> list[float]:
 
     most.network.voxelise = timed
     return seconds
-
-
-def peak_memory() -> float:
-    """Peak resident memory of this process, GB."""
-    status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
-    return int(status["VmHWM"].split()[0]) / 1e6
 
 
 def measured(arguments: argparse.Namespace, previous: int) -> dict:

@@ -195,6 +195,13 @@ def test_sweeps_between_those_that_are_asked_about_fill_the_windows(model, reade
             assert torch.equal(written, TAXONOMY.encode(step.semantics, step.ids))
 
 
+def test_any_clock_will_do(model):
+    first = model.step(scan(0), lidar_pose(0), 0.0)
+    model.begin()
+    assert same(model.step(scan(0), lidar_pose(0), -64.0), first)
+    assert model.tracker.tracks().last_seen.unique().tolist() == [-64.0]
+
+
 def test_the_callers_memory_may_be_used_again(model):
     whole = [model.step(scan(index), lidar_pose(index), 0.1 * index) for index in range(4)]
     model.begin()

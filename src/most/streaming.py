@@ -7,6 +7,7 @@
 ``most.predict`` labels a dataset with the same class, so both say the same of a sequence, bit for bit.
 """
 
+import math
 import time
 import warnings
 from collections.abc import Mapping
@@ -76,7 +77,7 @@ class PanopticTracker:
         """Begin another sequence: nothing came before."""
         self.tracker = new_tracker(self.settings, self.taxonomy)
         self._windows = SlidingWindow(self.previous)
-        self._scans, self._time = 0, -PERIOD
+        self._scans, self._time = 0, -math.inf
 
     def state(self) -> dict[str, Any]:
         """Return all that later scans depend on, in plain types and tensors: ``torch.save`` keeps it."""
@@ -152,7 +153,8 @@ class PanopticTracker:
 
     def _sweep(self, points: Array, pose: Array | None, timestamp: float | None) -> Sweep:
         world = torch.eye(4, dtype=torch.float64) if pose is None else _as_pose(pose)
-        seconds = self._time + PERIOD if timestamp is None else float(timestamp)
+        following = self._time + PERIOD if self._scans else 0.0
+        seconds = following if timestamp is None else float(timestamp)
         self.tracker.check(None if pose is None else world, seconds)  # before the network's work
         if seconds <= self._time:
             raise DataError(f"sweep at {seconds} s: expected a time after the last sweep's {self._time} s")
