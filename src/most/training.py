@@ -24,9 +24,10 @@ from most.datasets.class_counts import class_counts
 from most.datasets.datamodule import SweepDataModule
 from most.datasets.reader import Reader
 from most.membership import Nearest, PointSegMLP
+from most.modal.extent import DropSmall
 from most.stages.callbacks import Throughput
 from most.stages.checkpoints import AtomicCheckpointIO, LastCheckpoint
-from most.stages.detection import DetectionStage
+from most.stages.detection import DetectionStage, DetectionTraining
 from most.stages.membership import MembershipStage
 from most.stages.stage import Stage
 from most.viz.callback import BevPictures
@@ -45,12 +46,21 @@ def build_detection(config: Config, data: SweepDataModule) -> DetectionStage:
     """Make the network and wire it for stage 1, which knows no membership but the nearest centre."""
     taxonomy, parts = data.reader.taxonomy, model_parts(config) | {"membership": Nearest()}
     predictor = build_predictor(build_network(parts, taxonomy), parts, taxonomy)
-    training = config.stage.detection
+    training = detection_training(config)
     balanced = training.losses.class_balance > 0
     counts = class_counts(data.reader, "train") if balanced else torch.ones(taxonomy.num_classes, dtype=torch.long)
     scans = len(data.reader.frames("train"))
     steps = training.epochs * steps_per_epoch(config, scans)
     return DetectionStage(predictor, taxonomy, counts, training, _notes(config, "detection", parts, data.reader), steps)
+
+
+def detection_training(config: Config) -> DetectionTraining:
+    """Return stage 1's settings, with the targets that the extent strategy leaves out."""
+    training: DetectionTraining = config.stage.detection
+    if not isinstance(config.extent, DropSmall):
+        return training
+    least = max(training.targets.min_points, config.extent.min_points)
+    return replace(training, targets=replace(training.targets, min_points=least))
 
 
 def steps_per_epoch(config: Config, scans: int) -> int:

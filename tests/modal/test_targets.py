@@ -23,8 +23,7 @@ def instance(x, y, z=-1.0, of=CAR, points=10, extent=(2.0, 1.0, 0.5), velocity=N
 
 
 def scene(*parts):
-    names = vars(instance(0.0, 0.0))
-    return Instances(**{name: torch.cat([getattr(part, name) for part in parts]) for name in names})
+    return Instances.cat(list(parts))
 
 
 def targets(*samples, **settings):

@@ -42,7 +42,7 @@ def test_segments_that_a_detection_claims_take_what_it_says():
 
 
 def test_the_detection_that_claims_most_counts():
-    two = Detections(**{name: torch.cat([value[1:], value[1:]]) for name, value in vars(FOUND).items()})
+    two = Detections.cat([FOUND.select(torch.tensor([1]))] * 2)
     two.scores = torch.tensor([0.8, 0.7])
     claimed = torch.tensor([0, 1, 1, -1, -1, -1, -1, -1])
     assert torch.allclose(observe(POINTS, LABELS, THINGS, two, claimed).observations.scores[0], torch.tensor(0.7))
