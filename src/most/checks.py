@@ -14,6 +14,7 @@ from most.datasets.reader import Reader
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError
 from most.membership import Nearest, PointSegMLPSettings
+from most.modal.extent import DropSmall
 from most.stages.trainer import TrainerSettings
 from most.training import batches_per_step
 
@@ -34,6 +35,7 @@ def stages_to_run(config: Config, reader: Reader, folder: Path) -> list[str]:
         check_extent(config.extent, reader, split)
     for name in names:
         batches_per_step(config, name)
+    check_dropped(config)
     if "membership" in names and not isinstance(config.membership, PointSegMLPSettings):
         raise ConfigError(
             "membership: expected one that stage 2 can train, such as full, found nearest; with it say stage=detection"
@@ -43,6 +45,16 @@ def stages_to_run(config: Config, reader: Reader, folder: Path) -> list[str]:
     check_folder(folder)
     check_stage1(config, reader.taxonomy)
     return names
+
+
+def check_dropped(config: Config) -> None:
+    """Refuse to drop no instance that is not dropped anyway: that would be another strategy's figures."""
+    already = config.stage.detection.targets.min_points
+    if isinstance(config.extent, DropSmall) and config.extent.min_points <= already:
+        raise ConfigError(
+            f"extent.min_points: expected more than stage.detection.targets.min_points = {already}, which leaves out "
+            f"what has fewer points under every strategy, found {config.extent.min_points}; raise it, or lower that"
+        )
 
 
 def check_devices(trainer: TrainerSettings) -> None:

@@ -59,8 +59,7 @@ def detection_training(config: Config) -> DetectionTraining:
     training: DetectionTraining = config.stage.detection
     if not isinstance(config.extent, DropSmall):
         return training
-    least = max(training.targets.min_points, config.extent.min_points)
-    return replace(training, targets=replace(training.targets, min_points=least))
+    return replace(training, targets=replace(training.targets, min_points=config.extent.min_points))
 
 
 def steps_per_epoch(config: Config, scans: int) -> int:

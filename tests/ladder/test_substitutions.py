@@ -115,3 +115,15 @@ def test_peaks_of_the_truths_heat_maps_are_its_centres_but_for_two_in_one_cell()
     scene, truth = scene_of(crowd)
     assert peaks(scene, truth).owners.tolist() == [0]
     assert target_maps(truth.instances, scene.evidence.bev_grid, TAXONOMY.things).heatmap.sigmoid().max() == 1
+
+
+def test_extents_come_with_yaws_where_either_knows_them() -> None:
+    scene, truth = scene_of(street())
+    given = detected(scene, (CAR, (-4.2, 3.2, -0.9)), (CAR, (0.0, 0.0, 0.0)), owners=[0, -1])
+    found = given.evidence.detections
+    assert extents(given, truth).evidence.detections.yaws is None
+    turned = replace(truth, instances=replace(truth.instances, yaws=torch.tensor([0.5, 0.7])))
+    assert extents(given, turned).evidence.detections.yaws.tolist() == [0.5, 0.0]
+    found.yaws = torch.tensor([1.0, 2.0])
+    assert extents(given, truth).evidence.detections.yaws.tolist() == [0.0, 2.0]
+    assert found.yaws.tolist() == [1.0, 2.0]

@@ -60,6 +60,7 @@ def with_pickled_objects(arrays: dict[str, np.ndarray]) -> None:
     [
         (without_roi, "found no roi"),
         (with_other_centres, r"centres: expected shape \(2, 3\), found \(1, 3\)"),
+        (with_too_many_yaws, r"yaws: expected shape \(2,\), found \(3,\)"),
         (with_unknown_detection, "assigned: expected .* from -1 to 1"),
         (with_pickled_objects, "allow_pickle"),
     ],
