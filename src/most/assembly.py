@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from torch import nn
 
 from most.config import Config, from_plain, to_plain
 from most.datasets.reader import Frame
@@ -92,6 +93,7 @@ def describe_run(config: Config, stage: str, frames: Sequence[Frame]) -> dict[st
         "seed": config.seed,
         "batch_size": config.dataset.batch_size,
         "processes": config.trainer.processes(),
+        "weights": config.weights,
     }
 
 
@@ -135,10 +137,15 @@ def _assemble(description: dict[str, Any], state: dict[str, Any]) -> Trained:
     parts = {group: from_plain(group, description["parts"][group]) for group in GROUPS}
     predictor = build_predictor(build_network(parts, taxonomy), parts, taxonomy)
     for name, module in predictor.modules().items():
-        prefix = f"{name}."
-        module.load_state_dict({key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)})
+        load_weights(module, name, state)
         module.eval()
     return Trained(predictor, taxonomy, description["sweeps"])
+
+
+def load_weights(module: nn.Module, name: str, state: dict[str, Any]) -> None:
+    """Give a part of a model the weights that a checkpoint's ``state_dict`` has under its name."""
+    prefix = f"{name}."
+    module.load_state_dict({key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)})
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:

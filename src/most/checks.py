@@ -6,15 +6,17 @@ from typing import Any
 import torch
 
 from most.assembly import describe, describe_run, model_parts, read_checkpoint
-from most.config import Config
+from most.config import Config, from_plain
 from most.datasets.reader import Reader
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError
 from most.membership import Nearest, PointSegMLPSettings
 from most.stages.trainer import TrainerSettings
 from most.training import batches_per_step
+from most.voxels import Grid
 
-STAGE1 = ("grid", "encoder", "backbone", "centre_head", "semantic_head")
+NETWORK = ("encoder", "backbone", "centre_head", "semantic_head")
+STAGE1 = ("grid", *NETWORK)
 
 
 def stages_to_run(config: Config, reader: Reader, folder: Path) -> list[str]:
@@ -38,6 +40,7 @@ def stages_to_run(config: Config, reader: Reader, folder: Path) -> list[str]:
         return names[names.index(check_resume(config, reader, folder)) :]
     check_folder(folder)
     check_stage1(config, reader.taxonomy)
+    check_weights(config, reader.taxonomy)
     return names
 
 
@@ -100,15 +103,35 @@ def check_stage1(config: Config, taxonomy: Taxonomy) -> None:
         raise ConfigError(
             "stage1: expected a checkpoint of stage 1, found none; say stage1=FILE, or train it: stage=both"
         )
-    path = Path(config.stage1)
+    _check_same(config, taxonomy, "stage1", ("taxonomy", "sweeps"), STAGE1)
+
+
+def check_weights(config: Config, taxonomy: Taxonomy) -> None:
+    """Refuse to begin with another network, or a network of other classes; its window and voxels may be others."""
+    if config.weights is None:
+        return
+    if "detection" not in config.stage.run:
+        raise ConfigError("weights: expected none where stage 1 is not trained; say stage=detection or stage=both")
+    _check_same(config, taxonomy, "weights", ("taxonomy",), NETWORK)
+    trained: Grid = from_plain("grid", read_checkpoint(Path(config.weights))["most"]["parts"]["grid"])
+    if trained.shape[2] != config.grid.shape[2]:
+        raise ConfigError(
+            f"weights: expected a grid of as many layers as this one, {config.grid.shape[2]}, "
+            f"found {trained.shape[2]} in {config.weights}; choose another grid"
+        )
+
+
+def _check_same(config: Config, taxonomy: Taxonomy, key: str, told: tuple[str, ...], parts: tuple[str, ...]) -> None:
+    """Refuse the checkpoint under ``key`` where what it says of itself, or of its parts, is not the configuration's."""
+    path = Path(getattr(config, key))
     saved, expected = read_checkpoint(path)["most"], describe(model_parts(config), taxonomy, config.dataset.sweeps)
-    pairs = {name: (expected[name], saved[name]) for name in ("taxonomy", "sweeps")}
-    pairs |= {name: (expected["parts"][name], saved["parts"][name]) for name in STAGE1}
+    pairs = {name: (expected[name], saved[name]) for name in told}
+    pairs |= {name: (expected["parts"][name], saved["parts"][name]) for name in parts}
     for name, (wanted, found) in pairs.items():
         if wanted != found:
             raise ConfigError(
-                f"stage1: {path} was trained with another {name}: expected {wanted}, found {found}; "
-                "repeat the settings that stage 1 was trained with"
+                f"{key}: {path} was trained with another {name}: expected {wanted}, found {found}; "
+                "repeat the settings that it was trained with"
             )
 
 

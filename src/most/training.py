@@ -17,7 +17,9 @@ from most.assembly import (
     describe,
     describe_run,
     load_trained,
+    load_weights,
     model_parts,
+    read_checkpoint,
 )
 from most.config import Config
 from most.datasets.class_counts import class_counts
@@ -44,7 +46,10 @@ def build_stage(name: str, config: Config, data: SweepDataModule, stage1: Path) 
 def build_detection(config: Config, data: SweepDataModule) -> DetectionStage:
     """Make the network and wire it for stage 1, which knows no membership but the nearest centre."""
     taxonomy, parts = data.reader.taxonomy, model_parts(config) | {"membership": Nearest()}
-    predictor = build_predictor(build_network(parts, taxonomy), parts, taxonomy)
+    network = build_network(parts, taxonomy)
+    if config.weights is not None:
+        load_weights(network, "network", read_checkpoint(Path(config.weights))["state_dict"])
+    predictor = build_predictor(network, parts, taxonomy)
     training = config.stage.detection
     balanced = training.losses.class_balance > 0
     counts = class_counts(data.reader, "train") if balanced else torch.ones(taxonomy.num_classes, dtype=torch.long)
