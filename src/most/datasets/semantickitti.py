@@ -46,10 +46,16 @@ class SemanticKITTISettings(DatasetSettings):
 
     root: str = "data/semantickitti"  # holds sequences/
     splits: Splits = field(default_factory=Splits)
+    key_every: int = 1  # every n-th scan is a key frame: 5 makes of ten scans a second a dataset of two
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.key_every < 1:
+            raise ConfigError(f"dataset.key_every: expected at least 1, found {self.key_every}")
 
     def official_reader(self) -> "SemanticKITTI":
         """Make the reader of the tree."""
-        return SemanticKITTI(self.root, self.splits)
+        return SemanticKITTI(self.root, self.splits, self.key_every)
 
 
 class SemanticKITTI:
@@ -57,9 +63,10 @@ class SemanticKITTI:
 
     max_gap = 0.35  # s; scans are 0.1 s apart
 
-    def __init__(self, root: str | Path, splits: Splits | None = None) -> None:
+    def __init__(self, root: str | Path, splits: Splits | None = None, key_every: int = 1) -> None:
+        """``key_every`` 5 makes a key frame of scans 0, 5, 10, ..."""
         self.root = self.place = Path(root).expanduser()
-        self.splits = splits or Splits()
+        self.splits, self.key_every = splits or Splits(), key_every
         self.taxonomy = Taxonomy.load("semantickitti")
         self._poses: dict[str, Tensor] = {}
         self._times: dict[str, Tensor] = {}
@@ -89,15 +96,19 @@ class SemanticKITTI:
         return present
 
     def frames(self, split: str) -> list[Frame]:
-        """All scans of a split."""
+        """The key frames of a split."""
         return [frame for sequence in self.sequences(split) for frame in self.key_frames(sequence)]
 
     def labelled_frames(self, split: str) -> list[Frame]:
-        """All frames of a split that have a label file; for scoring, which needs no scans."""
-        return [frame for name in self.sequences(split) for frame in self._list(name, "labels", "label")]
+        """All key frames of a split that have a label file; for scoring, which needs no scans."""
+        return [frame for name in self.sequences(split) for frame in self._keys(self._list(name, "labels", "label"))]
 
     def key_frames(self, sequence: str) -> list[Frame]:
-        """All scans of a sequence: each of them is annotated."""
+        """The scans of a sequence that are trained on, predicted and scored: all, or every ``key_every``-th."""
+        return self._keys(self.frames_of(sequence))
+
+    def annotated(self, sequence: str) -> list[Frame]:
+        """All scans of a sequence: each of them has labels."""
         return self.frames_of(sequence)
 
     def frames_of(self, sequence: str) -> list[Frame]:
@@ -170,6 +181,9 @@ class SemanticKITTI:
     def submission_notes(self, frames: list[Frame]) -> dict[str, bytes]:
         """Nothing: the server takes labels alone."""
         return {}
+
+    def _keys(self, frames: list[Frame]) -> list[Frame]:
+        return [frame for frame in frames if frame.index % self.key_every == 0]
 
     def _scan_path(self, frame: Frame) -> Path:
         return self.folder(frame.sequence) / "velodyne" / f"{_stem(frame)}.bin"

@@ -93,6 +93,10 @@ class PanopticNuScenes:
         """The annotated sweeps of a scene, two a second."""
         return [Frame(sequence, index) for index, sweep in enumerate(self._sweeps(sequence)) if sweep.is_key]
 
+    def annotated(self, sequence: str) -> list[Frame]:
+        """The key frames: no other sweep has labels."""
+        return self.key_frames(sequence)
+
     def frames_of(self, sequence: str) -> list[Frame]:
         """All sweeps of a scene, twenty a second."""
         return [Frame(sequence, index) for index in range(len(self._sweeps(sequence)))]
