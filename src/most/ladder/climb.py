@@ -45,7 +45,7 @@ class Ladder:
         self.taxonomy, self.instances, self.look, self.device = taxonomy, instances, look, torch.device(device)
         self.ceilings: list[Ceiling] = ceilings(self.taxonomy)
         settings = look.settings
-        peaks = Peaks(settings.detector, settings.roi, list(self.taxonomy.things))
+        peaks = Peaks(settings.detector, settings.roi, list(self.taxonomy.things), look.targets)
         self.climbers = [Climber(rung, self.taxonomy, settings, tracker) for rung in rungs(look.has_model, peaks)]
 
     def add(self, window: Window) -> None:
