@@ -41,7 +41,7 @@ class Ladder:
         tracker: TrackerSettings,
         device: torch.device | str = "cpu",
     ) -> None:
-        """``device`` is the model's."""
+        """Everything but tracking and scoring happens on ``device``, where a model must be."""
         self.taxonomy, self.instances, self.look, self.device = taxonomy, instances, look, torch.device(device)
         self.ceilings: list[Ceiling] = ceilings(self.taxonomy)
         settings = look.settings

@@ -85,7 +85,7 @@ class NoModel:
 
     def _nothing(self, sample: Sample) -> Evidence:
         points, grid = sample.points[: sample.num_current, :3], self.grid.bev(BEV_STRIDE)
-        void, rows = torch.zeros(len(points), dtype=torch.long), points[:0]
+        void, rows = points.new_zeros(len(points), dtype=torch.long), points[:0]
         return Evidence(
             points=points,
             semantics=void,
