@@ -14,7 +14,7 @@ from most.config import conf_dir, register, store_root, typed
 from most.datasets.instances import InstanceTables
 from most.datasets.taxonomy import Taxonomy
 from most.device import chosen_device
-from most.entry import run, start
+from most.entry import refuse_idle, run, start
 from most.inference import Inference
 from most.ladder import Ladder, Look, ModelLook, NoModel, check_labels, climb, format_ladder
 from most.metrics.report import write_report
@@ -63,6 +63,8 @@ def targets_of(trained: Trained, checkpoint: str) -> HeatmapTargets:
 
 def oracle(config: OracleConfig) -> None:
     """Write every row's report to ``out`` and print the main figures."""
+    if config.checkpoint is not None:
+        refuse_idle(("grid", "inference"), "with a checkpoint, which has its own")
     dataset, reader = config.dataset, config.dataset.reader()
     device = chosen_device(config.device)
     look, previous = look_of(config, reader.taxonomy, device)

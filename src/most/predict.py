@@ -11,7 +11,7 @@ from most.assembly import load_trained
 from most.config import conf_dir, register, store_root, typed
 from most.datasets.scan_folder import ScanFolder, ScanFolderSettings
 from most.device import chosen_device
-from most.entry import run, start
+from most.entry import refuse_idle, run, start
 from most.membership import Nearest
 from most.predicting import describe_model, predict_split
 from most.predicting_scans import predict_scans
@@ -42,6 +42,10 @@ store_root("predict", PredictConfig)
 
 def predict(config: PredictConfig) -> None:
     """Write labels with the numbers of tracks, and detections beside them, to the folder ``out``."""
+    if config.input is None:
+        refuse_idle(("scans",), "without input=FOLDER, whose scans they are about")
+    else:
+        refuse_idle(("dataset", "split"), "with input, whose scans belong to no dataset")
     checkpoint = Path(config.checkpoint)
     trained = load_trained(checkpoint)
     if config.nearest:
