@@ -66,7 +66,9 @@ def test_labels_that_do_not_fit_the_scan_are_refused_by_name(model, folder, tmp_
     scans, out = ScanFolder(folder), tmp_path / "out"
     label_scans(model, scans, out)
     np.save(folder / "scan_3.npy", cloud(299).numpy())
-    with pytest.raises(DataError, match=r"scan_3\.label: expected labels of the scan's 299 points, found 300"):
+    with pytest.raises(
+        DataError, match=r"scan_3\.label: labels: expected a label for each of the scan's 299 points, found 300"
+    ):
         label_scans(model, scans, out)
 
 

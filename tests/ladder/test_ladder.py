@@ -59,10 +59,10 @@ def test_everything_substituted_is_the_ceiling() -> None:
 
 @pytest.mark.parametrize(("least", "found"), [(4, 1 / 8), (5, 0)])
 def test_heat_maps_are_drawn_as_the_model_learned_them(least: int, found: float) -> None:
-    """A car of four points; a model that was taught those of five and more says nothing of it."""
+    """Cars of four points; a model that was taught those of five and more leaves them together, without ids."""
     settings = Inference(fusion=Fusion(unclaimed="zero"))
     look = replace(no_model(), settings=settings, targets=HeatmapTargets(min_points=least))
-    rows = climbed(drive([[(CAR, (0, 0, 0)), *STREET]]), look)
+    rows = climbed(drive([[(CAR, (0, 0, 0)), (OTHER_CAR, (8, 0, 0)), *STREET]]), look)
     assert rows[EVERYTHING]["panoptic"]["pq_things"] == pytest.approx(1 / 8)
     assert rows[f"{EVERYTHING}, centres by heat map"]["panoptic"]["pq_things"] == pytest.approx(found)
 
