@@ -14,7 +14,8 @@ from most.datasets.window_stream import WindowStream
 from most.detections import PeakDetector
 from most.errors import DataError
 from most.inference import Inference
-from most.predicting import read_prediction, write_predictions
+from most.predicting import write_predictions
+from most.predictions import read_prediction
 from most.streaming import PanopticTracker
 from most.tracking import TrackerSettings
 from semantickitti_tree import TR, lidar_pose

@@ -22,7 +22,7 @@ RECORD = "tracks.json"
 
 def new_tracker(settings: TrackerSettings, taxonomy: Taxonomy) -> Tracker:
     """Make the tracker of one sequence, whose numbers labels have room for."""
-    return settings.build(taxonomy.gates, taxonomy.label.step - 1, taxonomy.label.unique_in == "class")
+    return settings.build(taxonomy.gates, taxonomy.label.largest, taxonomy.label.unique_in == "class")
 
 
 def write_tracks(reader: Reader, split: str, predictions: Path, out: Path, settings: TrackerSettings) -> None:
