@@ -77,7 +77,13 @@ DRAWN = {"kind": "gaussian_radius", "min_variance": 1.0, "min_overlap": 0.2, "mi
     ],
 )
 def test_a_checkpoint_of_either_stage_says_how_heat_maps_were_drawn(tmp_path, told, targets):
-    assert load_trained(save(tmp_path, checkpoint(tiny_predictor()) | told)).targets() == targets
+    trained = load_trained(save(tmp_path, checkpoint(tiny_predictor()) | told))
+    assert trained.targets == targets
+    if targets is None:
+        with pytest.warns(UserWarning, match="does not say how heat maps were drawn: the default is taken"):
+            assert trained.likely_targets() == HeatmapTargets()
+    else:
+        assert trained.likely_targets() == targets
 
 
 @pytest.mark.parametrize("targets", [{"kind": "square"}, {"radius": 2}, 7])

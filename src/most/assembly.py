@@ -1,5 +1,6 @@
 """Putting the components together, and the checkpoint that takes them apart again."""
 
+import warnings
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
@@ -118,20 +119,20 @@ class Trained:
     taxonomy: Taxonomy
     sweeps: int  # previous sweeps in its window
     stage1: dict[str, Any] = field(default_factory=dict)  # what ``describe_run`` said of stage 1; empty: not known
+    targets: HeatmapTargets | None = None  # how the heat maps that it learned from were drawn; None: not known
 
-    def targets(self) -> HeatmapTargets | None:
-        """Return how the heat maps that the network learned from were drawn; None where its checkpoint does not say."""
-        settings = self.stage1.get("training", {}).get("targets")
-        return None if settings is None else HeatmapTargets(**settings)
+    def likely_targets(self) -> HeatmapTargets:
+        """Return how its heat maps were drawn; the default, with a warning, where the checkpoint does not say."""
+        if self.targets is None:
+            warnings.warn("the checkpoint does not say how heat maps were drawn: the default is taken", stacklevel=2)
+        return self.targets or HeatmapTargets()
 
 
 def load_trained(path: Path) -> Trained:
     """Read a checkpoint; a file that is none, of another version or of another taxonomy, is a DataError."""
     checkpoint = read_checkpoint(path)
     try:
-        trained = _assemble(checkpoint["most"], checkpoint["state_dict"], stage1_run(checkpoint))
-        trained.targets()  # what it says of them is read now or never
-        return trained
+        return _assemble(checkpoint["most"], checkpoint["state_dict"], stage1_run(checkpoint))
     except (ConfigError, KeyError, TypeError, AttributeError, RuntimeError) as error:
         raise DataError(
             f"{path}: expected a model that this version of most can make, found another ({error}); "
@@ -155,7 +156,9 @@ def _assemble(description: dict[str, Any], state: dict[str, Any], stage1: dict[s
     for name, module in predictor.modules().items():
         load_weights(module, name, state)
         module.eval()
-    return Trained(predictor, taxonomy, description["sweeps"], stage1)
+    drawn = stage1.get("training", {}).get("targets")
+    targets = None if drawn is None else HeatmapTargets(**drawn)
+    return Trained(predictor, taxonomy, description["sweeps"], stage1, targets)
 
 
 def load_weights(module: nn.Module, name: str, state: dict[str, Any]) -> None:

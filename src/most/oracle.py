@@ -1,6 +1,5 @@
 """What each stage costs: ``python -m most.oracle checkpoint=FILE split=val out=oracle.json``."""
 
-import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,7 @@ import hydra
 import torch
 from omegaconf import DictConfig
 
-from most.assembly import Trained, check_taxonomy, load_trained
+from most.assembly import check_taxonomy, load_trained
 from most.config import conf_dir, register, store_root, typed
 from most.datasets.instances import InstanceTables
 from most.datasets.taxonomy import Taxonomy
@@ -18,7 +17,6 @@ from most.entry import refuse_idle, run, start
 from most.inference import Inference
 from most.ladder import Ladder, Look, ModelLook, NoModel, check_labels, climb, format_ladder
 from most.metrics.report import write_report
-from most.modal.heatmap import HeatmapTargets
 
 
 @dataclass
@@ -51,14 +49,7 @@ def look_of(config: OracleConfig, taxonomy: Taxonomy, device: torch.device) -> t
     check_taxonomy(trained.taxonomy, taxonomy)
     for module in trained.predictor.modules().values():
         module.to(device)
-    return ModelLook(trained.predictor, targets_of(trained, config.checkpoint)), trained.sweeps
-
-
-def targets_of(trained: Trained, checkpoint: str) -> HeatmapTargets:
-    """Return how the model's heat maps were drawn; the default, with a warning, where its checkpoint does not say."""
-    if (targets := trained.targets()) is None:
-        warnings.warn(f"{checkpoint}: does not say how its heat maps were drawn; the default is taken", stacklevel=3)
-    return targets or HeatmapTargets()
+    return ModelLook(trained.predictor, trained.likely_targets()), trained.sweeps
 
 
 def oracle(config: OracleConfig) -> None:
