@@ -11,6 +11,7 @@ from lightning.pytorch.callbacks import Callback, LearningRateMonitor, ModelChec
 from lightning.pytorch.loggers import Logger
 
 from most.assembly import (
+    STAGE1_RUN,
     build_membership,
     build_network,
     build_predictor,
@@ -73,10 +74,11 @@ def batches_per_step(config: Config, stage: str) -> int:
 def build_membership_stage(config: Config, stage1: Path, reader: Reader) -> MembershipStage:
     """Read stage 1 from a checkpoint and put a new membership after it."""
     parts, taxonomy = model_parts(config), reader.taxonomy
-    predictor = replace(load_trained(stage1).predictor, settings=config.inference)
+    trained = load_trained(stage1)
+    predictor = replace(trained.predictor, settings=config.inference)
     membership = build_membership(parts, predictor.network, taxonomy)
     assert isinstance(membership, PointSegMLP)  # most.checks
-    notes = _notes(config, "membership", parts, reader)
+    notes = _notes(config, "membership", parts, reader) | {STAGE1_RUN: trained.stage1}
     return MembershipStage(predictor, membership, taxonomy, config.stage.membership, notes, config.seed)
 
 

@@ -16,7 +16,7 @@ from most.datasets.reader import SPLITS, Frame
 from most.datasets.settings import DatasetSettings
 from most.datasets.splits import check_once, check_split, present_sequences
 from most.datasets.taxonomy import Taxonomy
-from most.errors import ConfigError, DataError
+from most.errors import ConfigError, DataError, check_entries
 from most.structures import Sweep
 
 
@@ -123,11 +123,8 @@ class SemanticKITTI:
         """Read a scan with its pose, time and labels; non-finite points stay, since every point needs a label."""
         points = read_scan(self._scan_path(frame))
         labels = self.labels(frame) if self.has_labels(frame.sequence) else None
-        if labels is not None and len(labels) != len(points):
-            raise DataError(
-                f"{self._label_path(frame)}: expected a label for each of the scan's {len(points)} points, "
-                f"found {len(labels)}; scan and labels are of different releases or one is cut off"
-            )
+        if labels is not None:
+            check_entries(self._label_path(frame), len(labels), len(points))
         pose, time = self.pose(frame), self._row(self.times(frame.sequence), frame, "times.txt")
         return Sweep(frame.sequence, frame.index, points, pose, float(time), labels)
 
