@@ -14,9 +14,10 @@ from most.config import Config, from_plain, to_plain
 from most.datasets.reader import Frame
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError, DataError
-from most.heads import CentreHead, SemanticHead
+from most.heads import CentreHead, OrientedCentreHead, SemanticHead
 from most.inference import Predictor
 from most.membership import Channels
+from most.modal.amodal import Amodal
 from most.modal.heatmap import HeatmapTargets
 from most.network import Network
 from most.panoptic import Membership
@@ -60,12 +61,13 @@ def build_predictor(network: Network, parts: dict[str, Any], taxonomy: Taxonomy)
 
 
 def model_parts(config: Config) -> dict[str, Any]:
-    """Pick what a trained model consists of out of a training's configuration."""
+    """Pick what a trained model consists of out of a training's configuration; amodal boxes have a yaw."""
+    centre = config.heads.centre
     return {
         "grid": config.grid,
         "encoder": config.encoder,
         "backbone": config.backbone,
-        "centre_head": config.heads.centre,
+        "centre_head": OrientedCentreHead(**vars(centre)) if isinstance(config.extent, Amodal) else centre,
         "semantic_head": config.heads.semantic,
         "membership": config.membership,
         "inference": config.inference,

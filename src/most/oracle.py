@@ -10,7 +10,7 @@ from omegaconf import DictConfig
 
 from most.assembly import check_taxonomy, load_trained
 from most.config import conf_dir, register, store_root, typed
-from most.datasets.instances import InstanceTables
+from most.datasets.instances import InstanceTables, check_extent
 from most.datasets.taxonomy import Taxonomy
 from most.device import chosen_device
 from most.entry import refuse_idle, run, start
@@ -60,6 +60,7 @@ def oracle(config: OracleConfig) -> None:
     device = chosen_device(config.device)
     look, previous = look_of(config, reader.taxonomy, device)
     check_labels(reader, config.split)
+    check_extent(config.extent, reader, config.split)
     tables = InstanceTables(reader, config.extent, dataset.tables)
     ladder = Ladder(reader.taxonomy, tables, look, config.tracker, device)
     climb(ladder, reader, config.split, previous, ahead=dataset.workers > 0)

@@ -49,6 +49,8 @@ def refused(folder: Path, command: str, *arguments: str, **limits: int) -> str:
     ("argument", "words"),
     [
         ("stage.detection.learning_rate=1", ["learning_rate", "not in 'DetectionTraining'"]),
+        ("extent=trackmax", ["extent/trackmax", "amodal", "class_mean", "drop_small", "shrink_wrap", "track_max"]),
+        ("extent=amodal", ["extent: expected amodal boxes", "found none for 00 in tree", "extent, such as track_max"]),
         ("backbone=resnet", ["backbone/resnet", "asymmetric_unet_small", "residual_unet"]),
         ("trainer.precision=8", ["trainer.precision", "bf16-mixed", "found 8"]),
         ("dataset.batch_size=two", ["dataset.batch_size", "two", "Integer"]),

@@ -125,3 +125,15 @@ def test_peaks_are_those_that_the_network_was_taught() -> None:
     for least, found in ((40, 2), (41, 0)):
         peaks = Peaks(PeakDetector(), RegionOfInterest(), TAXONOMY.things, HeatmapTargets(min_points=least))
         assert len(peaks(scene, truth).evidence.detections) == found
+
+
+def test_extents_come_with_yaws_where_either_knows_them() -> None:
+    scene, truth = scene_of(street())
+    given = detected(scene, (CAR, (-4.2, 3.2, -0.9)), (CAR, (0.0, 0.0, 0.0)), owners=[0, -1])
+    found = given.evidence.detections
+    assert extents(given, truth).evidence.detections.yaws is None
+    turned = replace(truth, instances=replace(truth.instances, yaws=torch.tensor([0.5, 0.7])))
+    assert extents(given, turned).evidence.detections.yaws.tolist() == [0.5, 0.0]
+    found.yaws = torch.tensor([1.0, 2.0])
+    assert extents(given, truth).evidence.detections.yaws.tolist() == [0.0, 2.0]
+    assert found.yaws.tolist() == [1.0, 2.0]

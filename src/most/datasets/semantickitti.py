@@ -10,6 +10,7 @@ from pathlib import Path
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
+from most.datasets.kitti_boxes import read_boxes
 from most.datasets.kitti_files import count_points, read_poses, read_scan, read_times
 from most.datasets.labels import read_labels, write_labels
 from most.datasets.reader import SPLITS, Frame
@@ -17,6 +18,7 @@ from most.datasets.settings import DatasetSettings
 from most.datasets.splits import check_once, check_split, present_sequences
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError, DataError, check_entries
+from most.modal.boxes import SequenceBoxes
 from most.structures import Sweep
 
 
@@ -158,6 +160,15 @@ class SemanticKITTI:
             if not path.is_file():
                 raise DataError(f"{path}: expected a file beside the sequence's {len(frames)} scans, found none")
         return scans + labels, texts
+
+    def box_files(self, sequence: str) -> list[Path]:
+        """``boxes.npz``, which simulated sequences alone have."""
+        path = self.folder(sequence) / "boxes.npz"
+        return [path] if path.is_file() else []
+
+    def sequence_boxes(self, sequence: str) -> SequenceBoxes:
+        """The boxes of a simulated sequence; instances know theirs by their number."""
+        return read_boxes(self.folder(sequence) / "boxes.npz", self.poses(sequence), self.taxonomy)
 
     def num_points(self, frame: Frame) -> int:
         """How many points a scan has."""

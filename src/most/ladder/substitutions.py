@@ -56,16 +56,24 @@ def centres(scene: Scene, truth: Truth) -> Scene:
     if scene.maps is not None:
         grid = scene.evidence.bev_grid
         x, y = _cells(instances.centres, grid).unbind(1)
-        _, found.extents, found.velocities = decode(scene.maps, x, y, grid)
+        _, found.extents, found.velocities, found.yaws = decode(scene.maps, x, y, grid)
     owners = torch.arange(len(instances), device=found.classes.device)
     return replace(scene, evidence=replace(scene.evidence, detections=found), owners=owners)
 
 
 def extents(scene: Scene, truth: Truth) -> Scene:
-    """Detections that stand for an instance have its extent."""
-    found, known = scene.evidence.detections, scene.owners >= 0
-    values = truth.instances.extents[scene.owners[known]]
-    return _detected(scene, replace(found, extents=found.extents.clone().index_put_((known,), values)))
+    """Detections that stand for an instance have its extent, and its yaw where boxes are turned."""
+    found, known, true = scene.evidence.detections, scene.owners >= 0, truth.instances
+    values = found.extents.clone().index_put_((known,), true.extents[scene.owners[known]])
+    yaws = None
+    if found.yaws is not None or true.yaws is not None:
+        right = _yaws(true)[scene.owners[known]]
+        yaws = _yaws(found).clone().index_put_((known,), right)
+    return _detected(scene, replace(found, extents=values, yaws=yaws))
+
+
+def _yaws(boxes: Detections | Instances) -> Float[Tensor, "boxes"]:
+    return torch.zeros_like(boxes.extents[:, 0]) if boxes.yaws is None else boxes.yaws
 
 
 def velocities(scene: Scene, truth: Truth) -> Scene:
@@ -127,7 +135,8 @@ def target_maps(instances: Instances, grid: BevGrid, things: list[int], settings
         return maps
 
     regressed = (targets.offset, targets.height, targets.extent, targets.velocity)
-    return BevMaps(targets.heatmap.logit(), *map(spread, regressed))
+    turned = () if targets.yaw is None else (targets.yaw,)
+    return BevMaps(targets.heatmap.logit(), *map(spread, regressed + turned))
 
 
 def _cells(places: Float[Tensor, "places 3"], grid: BevGrid) -> Int64[Tensor, "places 2"]:

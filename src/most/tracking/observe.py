@@ -6,6 +6,7 @@ import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
+from most.geometry.boxes import bounds
 from most.structures import Detections, Observations, OnDevice, Panoptic
 
 UNDETECTED = 0.0  # score of a segment that no detection claims: any detection chooses its track before it
@@ -86,6 +87,7 @@ def _by_detections(
     most, best = votes.reshape(len(seen), len(detections)).max(1)
     found = ((most > 0) & (detections.classes[best] == seen.classes)).nonzero().squeeze(1)
     lent = detections.select(best[found])
+    lent.extents = bounds(lent.extents, lent.yaws)
     for name in ("centres", "extents", "velocities", "scores"):
         setattr(seen, name, getattr(seen, name).index_copy(0, found, getattr(lent, name).float()))
     for name in ("velocity_known", "placed"):

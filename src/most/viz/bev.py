@@ -141,9 +141,10 @@ def _draw_objects(
     objects, moving = objects.to("cpu"), moving.cpu()
     colours = [style.colour(one) for one in objects.classes.tolist()]
     centres, half_sizes = objects.centres[:, :2].numpy(), objects.extents[:, :2].numpy()
-    boxes = [
-        Rectangle((y - b, x - a), 2 * b, 2 * a)
-        for (x, y), (a, b) in zip(centres.tolist(), half_sizes.tolist(), strict=True)
+    yaws = [0.0] * len(centres) if objects.yaws is None else objects.yaws.rad2deg().tolist()
+    boxes = [  # drawn over (y, x), where a turn from x to y is clockwise
+        Rectangle((y - b, x - a), 2 * b, 2 * a, angle=-yaw, rotation_point="center")
+        for (x, y), (a, b), yaw in zip(centres.tolist(), half_sizes.tolist(), yaws, strict=True)
     ]
     axes.add_collection(PatchCollection(boxes, facecolor="none", edgecolor=colours, linewidth=0.9, zorder=3))
     for one in objects.classes.unique().tolist():

@@ -20,7 +20,7 @@ from most.viz.bev import SLOW
 
 @dataclass
 class Objects:
-    """Boxes along the axes of one scan's sensor frame."""
+    """Boxes in one scan's sensor frame."""
 
     segments: Int64[Tensor, "objects"]  # identity, as ``agreement.segments`` names it; 0 for none
     classes: Int64[Tensor, "objects"]
@@ -28,6 +28,7 @@ class Objects:
     half_sizes: Float[Tensor, "objects 3"]  # m
     velocities: Float[Tensor, "objects 2"]  # over the ground, m/s
     moving: Bool[Tensor, "objects"]  # known to be faster than modal centres of standing things seem to be
+    yaws: Float[Tensor, "objects"] | None = None  # from x to where half-sizes lie along; None: along the axes
 
     def __len__(self) -> int:
         return len(self.classes)
@@ -76,7 +77,7 @@ def _objects(
     found: Detections | Instances, segments: Int64[Tensor, "objects"], known: Bool[Tensor, "objects"]
 ) -> Objects:
     moving = known & (found.velocities.norm(dim=1) > SLOW)
-    return Objects(segments, found.classes, found.centres, found.extents, found.velocities, moving)
+    return Objects(segments, found.classes, found.centres, found.extents, found.velocities, moving, found.yaws)
 
 
 def _rules(reader: Reader, to_training: Callable[[Tensor], Tensor]) -> LabelRules:

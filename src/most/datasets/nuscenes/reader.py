@@ -11,7 +11,7 @@ from pathlib import Path
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
-from most.datasets.nuscenes.boxes import AmodalBoxes, Annotations
+from most.datasets.nuscenes.boxes import BOX_TABLES, AmodalBoxes, Annotations, join_boxes
 from most.datasets.nuscenes.files import count_points, read_classes, read_panoptic, read_scan, write_panoptic
 from most.datasets.nuscenes.labels import LabelFiles
 from most.datasets.nuscenes.scenes import LidarSweep, Scenes
@@ -21,6 +21,7 @@ from most.datasets.settings import DatasetSettings
 from most.datasets.splits import check_split, present_sequences
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError, DataError, check_entries
+from most.modal.boxes import SequenceBoxes
 from most.structures import Sweep
 
 META = {  # of a submission; the task of tracking is scored in all figures of segmentation, too
@@ -132,6 +133,16 @@ class PanopticNuScenes:
     def boxes(self, frame: Frame) -> AmodalBoxes:
         """The amodal boxes of a key frame, in its sensor frame; none where nothing is annotated."""
         return self._annotations.boxes(self._row(frame).sample, self.poses(frame.sequence)[frame.index])
+
+    def box_files(self, sequence: str) -> list[Path]:
+        """The tables of annotations; the test version has none."""
+        tables = [self.place / f"{name}.json" for name in BOX_TABLES]
+        return tables if all(path.is_file() for path in tables) else []
+
+    def sequence_boxes(self, sequence: str) -> SequenceBoxes:
+        """The boxes of a scene's key frames; which numbers their things have in its labels, the tables do not say."""
+        frames = self.key_frames(sequence)
+        return join_boxes([frame.index for frame in frames], list(map(self.boxes, frames)), self.taxonomy)
 
     def poses(self, sequence: str) -> Float64[Tensor, "rows 4 4"]:
         """World_from_sensor by frame number, float64; the world is the map's."""
