@@ -12,7 +12,7 @@ from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError
 from most.membership import Nearest, PointSegMLPSettings
 from most.stages.trainer import TrainerSettings
-from most.training import batches_per_step
+from most.training import batches_per_step, stage1_file
 
 STAGE1 = ("grid", "encoder", "backbone", "centre_head", "semantic_head")
 
@@ -77,7 +77,7 @@ def check_resume(config: Config, reader: Reader, folder: Path) -> str:
         "most_run": describe_run(config, stage, reader.frames("train")),
     }
     for part, now in expected.items():
-        began, goes_on = _flat(saved[part]), _flat(now)
+        began, goes_on = flat(saved[part]), flat(now)
         for key in goes_on | began:
             if began.get(key) != goes_on.get(key):
                 raise ConfigError(
@@ -100,7 +100,7 @@ def check_stage1(config: Config, taxonomy: Taxonomy) -> None:
         raise ConfigError(
             "stage1: expected a checkpoint of stage 1, found none; say stage1=FILE, or train it: stage=both"
         )
-    path = Path(config.stage1)
+    path = stage1_file(config, Path(config.stage1))
     saved, expected = read_checkpoint(path)["most"], describe(model_parts(config), taxonomy, config.dataset.sweeps)
     pairs = {name: (expected[name], saved[name]) for name in ("taxonomy", "sweeps")}
     pairs |= {name: (expected["parts"][name], saved["parts"][name]) for name in STAGE1}
@@ -112,9 +112,9 @@ def check_stage1(config: Config, taxonomy: Taxonomy) -> None:
             )
 
 
-def _flat(settings: dict[str, Any], before: str = "") -> dict[str, Any]:
-    """Nested settings by dotted names."""
-    flat: dict[str, Any] = {}
+def flat(settings: dict[str, Any], before: str = "") -> dict[str, Any]:
+    """Return nested settings by dotted names."""
+    leaves: dict[str, Any] = {}
     for key, value in settings.items():
-        flat |= _flat(value, f"{before}{key}.") if isinstance(value, dict) else {f"{before}{key}": value}
-    return flat
+        leaves |= flat(value, f"{before}{key}.") if isinstance(value, dict) else {f"{before}{key}": value}
+    return leaves

@@ -31,6 +31,8 @@ from most.stages.membership import MembershipStage
 from most.stages.stage import Stage
 from most.viz.callback import BevPictures
 
+METRICS = "metrics.json"  # of a run; it is written at its end
+
 
 def build_stage(name: str, config: Config, data: SweepDataModule, stage1: Path) -> Stage:
     """Make a stage, and tell the data how large its batches are; ``stage1`` is read for stage 2 alone."""
@@ -88,10 +90,15 @@ def checkpoint_path(folder: Path, stage: str, which: str) -> Path:
     return folder / "checkpoints" / f"{stage}-{which}.ckpt"
 
 
-def handed_over(config: Config, folder: Path) -> Path:
-    """Return the stage 1 that stage 2 of the same run gets: the last one where a run never validated on the way."""
-    best = checkpoint_path(folder, "detection", "best")
-    return best if config.stage.hand_over == "best" and best.is_file() else checkpoint_path(folder, "detection", "last")
+def stage1_file(config: Config, place: Path) -> Path:
+    """Return the stage 1 that stage 2 gets: ``place`` itself, or of the run in this folder.
+
+    It is the last one where that run never validated on the way.
+    """
+    if not place.is_dir():
+        return place
+    best = checkpoint_path(place, "detection", "best")
+    return best if config.stage.hand_over == "best" and best.is_file() else checkpoint_path(place, "detection", "last")
 
 
 def build_trainer(config: Config, stage: Stage, folder: Path, logger: Logger | bool) -> L.Trainer:
