@@ -138,6 +138,11 @@ def chosen(choices: Mapping[str, str]) -> dict[str, str]:
     return {group: member for group, member in choices.items() if not group.startswith("hydra/")}
 
 
+def by_key(overrides: Sequence[str]) -> dict[str, str]:
+    """Return what overrides say of which key."""
+    return dict(override.lstrip("+").split("=", 1) for override in overrides if "=" in override)
+
+
 def as_job(work: Callable[[], Any]) -> Any:
     """Do one job's work; its failure becomes an error that processes can pass on, and its traceback goes to the log."""
     try:

@@ -16,10 +16,11 @@ from most.checks import stages_to_run
 from most.config import Config, conf_dir, register, typed
 from most.datasets.datamodule import SweepDataModule
 from most.entry import run, start
+from most.logs import log_artifacts
 from most.metrics.report import write_report
 from most.stages.stage import Stage
-from most.sweeps import as_job, chosen, in_sweep
-from most.training import METRICS, build_stage, build_trainer, stage1_file
+from most.sweeps import as_job, by_key, chosen, in_sweep
+from most.training import METRICS, build_stage, build_trainer, run_files, stage1_file
 
 register()
 
@@ -39,6 +40,7 @@ def train(config: Config, folder: Path, told: dict[str, Any]) -> float:
         logger = config.logger.build(folder, config.name, settings | told)
         for name in names:
             stage = run_stage(name, config, data, folder, logger, config.resume if name == names[0] else None)
+        log_artifacts(logger, run_files(config, folder))
     finally:
         wandb.finish()  # the next job of a sweep runs in this process, and is another run
     return float(stage.report["panoptic"]["pq"])
@@ -64,7 +66,7 @@ def main(config: DictConfig) -> Any:
     """Compose, check, train; a sweeper that optimises gets the PQ."""
     job = HydraConfig.get()
     folder = Path(job.runtime.output_dir)
-    told = {"choices": chosen(job.runtime.choices), "overrides": list(job.overrides.task)}
+    told = {"choices": chosen(job.runtime.choices), "overrides": by_key(job.overrides.task)}
     if job.mode != RunMode.MULTIRUN:
         run(lambda: train(typed(config), folder, told))
         return None

@@ -30,6 +30,7 @@ from most.stages.detection import DetectionStage
 from most.stages.membership import MembershipStage
 from most.stages.stage import Stage
 from most.viz.callback import BevPictures
+from most.viz.class_tables import ClassTables
 
 METRICS = "metrics.json"  # of a run; it is written at its end
 
@@ -90,6 +91,13 @@ def checkpoint_path(folder: Path, stage: str, which: str) -> Path:
     return folder / "checkpoints" / f"{stage}-{which}.ckpt"
 
 
+def run_files(config: Config, folder: Path) -> dict[str, list[Path]]:
+    """Return what a finished run leaves, by kind: its last model, its figures, and what it was told."""
+    told = [folder / ".hydra" / name for name in ("config.yaml", "overrides.yaml")]
+    model = checkpoint_path(folder, config.stage.run[-1], "last")
+    return {"model": [model], "metrics": [folder / METRICS], "config": told}
+
+
 def stage1_file(config: Config, place: Path) -> Path:
     """Return the stage 1 that stage 2 gets: ``place`` itself, or of the run in this folder.
 
@@ -148,7 +156,7 @@ def _callbacks(config: Config, stage: Stage, folder: Path) -> list[Callback]:
         Throughput(stage.prefix),
     ]
     if config.logger.kind != "none":
-        callbacks.append(LearningRateMonitor("step"))
+        callbacks += [LearningRateMonitor("step"), ClassTables(stage.prefix)]
     if config.logger.pictures:
         callbacks.append(BevPictures(config.logger.pictures, folder / "pictures" / stage.name, stage.prefix))
     if config.trainer.progress_bar:
