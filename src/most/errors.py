@@ -36,6 +36,12 @@ class StoppedError(MostError):
         self.exit_code = exit_code
 
 
+class FailedError(MostError):
+    """Jobs of a sweep failed; the message says which, and why."""
+
+    exit_code = 1
+
+
 @contextmanager
 def named(place: object) -> Iterator[None]:
     """Say in a DataError of the work within where it happened."""

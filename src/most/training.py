@@ -34,6 +34,9 @@ from most.stages.detection import DetectionStage, DetectionTraining
 from most.stages.membership import MembershipStage
 from most.stages.stage import Stage
 from most.viz.callback import BevPictures
+from most.viz.class_tables import ClassTables
+
+METRICS = "metrics.json"  # of a run; it is written at its end
 
 
 def build_stage(name: str, config: Config, data: SweepDataModule, stage1: Path) -> Stage:
@@ -50,7 +53,7 @@ def build_detection(config: Config, data: SweepDataModule) -> DetectionStage:
     taxonomy, parts = data.reader.taxonomy, model_parts(config) | {"membership": Nearest()}
     network = build_network(parts, taxonomy)
     if config.weights is not None:
-        load_weights(network, "network", read_checkpoint(Path(config.weights))["state_dict"])
+        load_weights(network, "network", read_checkpoint(stage1_file(config, Path(config.weights)))["state_dict"])
     predictor = build_predictor(network, parts, taxonomy)
     training = detection_training(config)
     balanced = training.losses.class_balance > 0
@@ -104,10 +107,22 @@ def checkpoint_path(folder: Path, stage: str, which: str) -> Path:
     return folder / "checkpoints" / f"{stage}-{which}.ckpt"
 
 
-def handed_over(config: Config, folder: Path) -> Path:
-    """Return the stage 1 that stage 2 of the same run gets: the last one where a run never validated on the way."""
-    best = checkpoint_path(folder, "detection", "best")
-    return best if config.stage.hand_over == "best" and best.is_file() else checkpoint_path(folder, "detection", "last")
+def run_files(config: Config, folder: Path) -> dict[str, list[Path]]:
+    """Return what a finished run leaves, by kind: its last model, its figures, and what it was told."""
+    told = [folder / ".hydra" / name for name in ("config.yaml", "overrides.yaml")]
+    model = checkpoint_path(folder, config.stage.run[-1], "last")
+    return {"model": [model], "metrics": [folder / METRICS], "config": told}
+
+
+def stage1_file(config: Config, place: Path) -> Path:
+    """Return the stage 1 that stage 2 gets: ``place`` itself, or of the run in this folder.
+
+    It is the last one where that run never validated on the way.
+    """
+    if not place.is_dir():
+        return place
+    best = checkpoint_path(place, "detection", "best")
+    return best if config.stage.hand_over == "best" and best.is_file() else checkpoint_path(place, "detection", "last")
 
 
 def build_trainer(config: Config, stage: Stage, folder: Path, logger: Logger | bool) -> L.Trainer:
@@ -157,7 +172,7 @@ def _callbacks(config: Config, stage: Stage, folder: Path) -> list[Callback]:
         Throughput(stage.prefix),
     ]
     if config.logger.kind != "none":
-        callbacks.append(LearningRateMonitor("step"))
+        callbacks += [LearningRateMonitor("step"), ClassTables(stage.prefix)]
     if config.logger.pictures:
         callbacks.append(BevPictures(config.logger.pictures, folder / "pictures" / stage.name, stage.prefix))
     if config.trainer.progress_bar:

@@ -2,7 +2,8 @@
 
 from typing import Any
 
-from torch import nn
+from jaxtyping import Int64
+from torch import Tensor, nn
 
 from most.datasets.taxonomy import Taxonomy
 from most.inference import Prediction
@@ -16,6 +17,8 @@ class Scores(nn.Module):
 
     Detections are held against modal centres, whatever the extent strategy has them trained for, as in evaluation.
     """
+
+    confusion: Int64[Tensor, "classes classes"]  # of the split taken last: points, indexed [predicted, truth]
 
     def __init__(self, taxonomy: Taxonomy) -> None:
         super().__init__()
@@ -41,6 +44,8 @@ class Scores(nn.Module):
     def take(self) -> dict[str, Any]:
         """Return the figures, fractions in [0, 1], those of each class under ``per_class``, and start afresh."""
         figures = self.quality.compute() | self.membership.compute() | {"per_class": self.quality.per_class()}
+        with self.quality.sync_context():
+            self.confusion = self.quality.confusion.cpu()
         self.quality.reset()
         self.membership.reset()
         return figures
