@@ -70,7 +70,7 @@ class _Scores:
     def report(self) -> dict[str, Any]:
         """Return all sections."""
         report = self.labels.report()
-        report["panoptic"]["sums"] = self.labels.sums.plain()
+        report["panoptic"]["sums"] = self.labels.plain_sums()
         return report
 
 

@@ -39,6 +39,13 @@ class SequenceScores:
         self.lstq.update(number, semantics, labels, truth_semantics, truth_labels)
         self.tracking.update(number, semantics, labels, truth_semantics, truth_labels)
 
+    def associations(self) -> dict[str, dict[str, list[float]]]:
+        """Return ``{assoc, tubes}`` by class of each sequence: what S_assoc is summed of."""
+        found, size = self.lstq.by_sequence(), self.taxonomy.num_classes
+        none = {"assoc": [0.0] * size, "tubes": [0] * size}
+        plain = {n: {"assoc": each.sums.tolist(), "tubes": each.tubes.tolist()} for n, each in found.items()}
+        return {name: plain.get(number, none) for name, number in self.numbers.items()}
+
     def report(self) -> dict[str, Any]:
         """Return the section ``lstq``, or on nuScenes ``tracking``, with ``per_class``; fractions in [0, 1]."""
         lstq = self.lstq.compute()
@@ -67,6 +74,13 @@ class LabelScores:
         """Add a scan; labels are whole, as they are on disk, and ``points`` in the sensor frame (m)."""
         self.sums.update(sequence, (semantics, labels), (truth_semantics, truth_labels), points, membership)
         self.sequences.update(sequence, semantics, labels, truth_semantics, truth_labels)
+
+    def plain_sums(self) -> dict[str, Any]:
+        """Return the section ``sums``, see :mod:`most.metrics.split_sums`, with what S_assoc is made of."""
+        section = self.sums.plain()
+        for name, tubes in self.sequences.associations().items():
+            section["sequences"][name] |= tubes
+        return section
 
     def report(self) -> dict[str, Any]:
         """Return the section ``panoptic`` with ``per_class``, and that of the 4D figures beside it."""

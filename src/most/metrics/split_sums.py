@@ -1,6 +1,6 @@
 """What all figures of a split are made of, summed by held-out sequence: the section ``sums`` of ``metrics.json``.
 
-    {"classes": [names by training id, void first], "things": [ids], "min_points": official threshold,
+    {"evaluator": whose rules, "classes": [names by training id, void first], "things": [ids], "min_points": theirs,
      "distance_edges": [m], "points_edges": [points],     where bins begin; the last one has no end
      "sequences": {NAME: {
         "scans": 3,
@@ -136,6 +136,7 @@ class SplitSums:
     def plain(self) -> dict[str, Any]:
         """Return the section ``sums``, sequences by name."""
         return {
+            "evaluator": self.taxonomy.evaluator,
             "classes": list(self.taxonomy.class_names),
             "things": list(self.taxonomy.things),
             "min_points": self.taxonomy.min_points,
