@@ -1,6 +1,6 @@
 """What a training is asked to do is held against what there is, before any work."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -175,6 +175,26 @@ def test_checkpoints_of_another_run_are_not_overwritten(config, reader, tmp_path
     kept = save(config, tmp_path, "detection")
     with pytest.raises(ConfigError, match=rf"expected a folder without checkpoints, found {kept}; .*resume={kept}"):
         stages_to_run(config, reader, tmp_path)
+
+
+def test_weights_to_begin_with_are_those_of_the_same_network(config, reader, tmp_path):
+    config.weights = str(save(config, tmp_path, "detection"))
+    folder = tmp_path / "new"
+    config.dataset.sweeps, config.grid = 5, replace(config.grid, voxel_size=[0.25, 0.25, 0.5])
+    assert stages_to_run(config, reader, folder) == ["detection", "membership"]  # another window, other voxels
+    config.grid = replace(config.grid, upper=[8.0, 8.0, 6.0])
+    with pytest.raises(ConfigError, match="weights: expected a grid of as many layers as this one, 16, found 8"):
+        stages_to_run(config, reader, folder)
+    config.backbone = AsymmetricUNetSmallSettings(widths=[4, 4, 8, 16], bev_channels=8)
+    with pytest.raises(ConfigError, match=r"weights: .* another backbone: expected .*16\].* found .*8\]"):
+        stages_to_run(config, reader, folder)
+
+
+def test_weights_to_begin_with_are_not_for_stage_2(config, reader, tmp_path):
+    config.weights = config.stage1 = str(save(config, tmp_path, "detection"))
+    config.stage.run = ["membership"]
+    with pytest.raises(ConfigError, match="weights: expected none where stage 1 is not trained"):
+        stages_to_run(config, reader, tmp_path / "new")
 
 
 def test_what_a_run_says_of_itself_is_plain(config):

@@ -13,11 +13,10 @@ from most.predicting import (
     claim_folder,
     describe_model,
     describe_split,
-    read_prediction,
     unfinished,
-    write_prediction,
     write_predictions,
 )
+from most.predictions import read_prediction, write_prediction
 from most.streaming import PanopticTracker
 from most.structures import Detections, Panoptic
 from most.tracking import TrackerSettings

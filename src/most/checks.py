@@ -16,9 +16,11 @@ from most.errors import ConfigError
 from most.membership import Nearest, PointSegMLPSettings
 from most.modal.extent import DropSmall
 from most.stages.trainer import TrainerSettings
-from most.training import batches_per_step
+from most.training import batches_per_step, stage1_file
+from most.voxels import Grid
 
-STAGE1 = ("grid", "encoder", "backbone", "centre_head", "semantic_head")
+NETWORK = ("encoder", "backbone", "centre_head", "semantic_head")
+STAGE1 = ("grid", *NETWORK)
 
 
 def stages_to_run(config: Config, reader: Reader, folder: Path) -> list[str]:
@@ -44,6 +46,7 @@ def stages_to_run(config: Config, reader: Reader, folder: Path) -> list[str]:
         return names[names.index(check_resume(config, reader, folder)) :]
     check_folder(folder)
     check_stage1(config, reader.taxonomy)
+    check_weights(config, reader.taxonomy)
     return names
 
 
@@ -93,7 +96,7 @@ def check_resume(config: Config, reader: Reader, folder: Path) -> str:
         "most_run": describe_run(config, stage, reader.frames("train")),
     }
     for part, now in expected.items():
-        began, goes_on = _flat(_completed(saved[part], config)), _flat(now)
+        began, goes_on = flat(_completed(saved[part], config)), flat(now)
         for key in goes_on | began:
             if began.get(key) != goes_on.get(key):
                 raise ConfigError(
@@ -116,16 +119,42 @@ def check_stage1(config: Config, taxonomy: Taxonomy) -> None:
         raise ConfigError(
             "stage1: expected a checkpoint of stage 1, found none; say stage1=FILE, or train it: stage=both"
         )
-    path = Path(config.stage1)
+    _check_same(config, taxonomy, "stage1", ("taxonomy", "sweeps"), STAGE1)
+
+
+def check_weights(config: Config, taxonomy: Taxonomy) -> None:
+    """Refuse to begin with another network, or a network of other classes; its window and voxels may be others."""
+    if config.weights is None:
+        return
+    if "detection" not in config.stage.run:
+        raise ConfigError("weights: expected none where stage 1 is not trained; say stage=detection or stage=both")
+    saved = _check_same(config, taxonomy, "weights", ("taxonomy",), NETWORK)
+    trained: Grid = from_plain("grid", saved["parts"]["grid"])
+    if trained.shape[2] != config.grid.shape[2]:
+        raise ConfigError(
+            f"weights: expected a grid of as many layers as this one, {config.grid.shape[2]}, "
+            f"found {trained.shape[2]} in {config.weights}; choose another grid"
+        )
+
+
+def _check_same(
+    config: Config, taxonomy: Taxonomy, key: str, told: tuple[str, ...], parts: tuple[str, ...]
+) -> dict[str, Any]:
+    """Return what the checkpoint under ``key`` says of its model; another than the configuration's is a ConfigError.
+
+    ``told`` names what it says of itself that has to agree, ``parts`` the components that have to.
+    """
+    path = stage1_file(config, Path(getattr(config, key)))
     saved, expected = read_checkpoint(path)["most"], describe(model_parts(config), taxonomy, config.dataset.sweeps)
-    pairs = {name: (expected[name], saved[name]) for name in ("taxonomy", "sweeps")}
-    pairs |= {name: (expected["parts"][name], _completed_part(name, saved["parts"][name])) for name in STAGE1}
+    pairs = {name: (expected[name], saved[name]) for name in told}
+    pairs |= {name: (expected["parts"][name], _completed_part(name, saved["parts"][name])) for name in parts}
     for name, (wanted, found) in pairs.items():
         if wanted != found:
             raise ConfigError(
-                f"stage1: {path} was trained with another {name}: expected {wanted}, found {found}; "
-                "repeat the settings that stage 1 was trained with"
+                f"{key}: {path} was trained with another {name}: expected {wanted}, found {found}; "
+                "repeat the settings that it was trained with"
             )
+    return saved
 
 
 def _completed(saved: dict[str, Any], config: Config) -> dict[str, Any]:
@@ -144,9 +173,9 @@ def _completed_part(group: str, part: dict[str, Any]) -> dict[str, Any]:
     return to_plain(group, from_plain(group, part))
 
 
-def _flat(settings: dict[str, Any], before: str = "") -> dict[str, Any]:
-    """Nested settings by dotted names."""
-    flat: dict[str, Any] = {}
+def flat(settings: dict[str, Any], before: str = "") -> dict[str, Any]:
+    """Return nested settings by dotted names."""
+    leaves: dict[str, Any] = {}
     for key, value in settings.items():
-        flat |= _flat(value, f"{before}{key}.") if isinstance(value, dict) else {f"{before}{key}": value}
-    return flat
+        leaves |= flat(value, f"{before}{key}.") if isinstance(value, dict) else {f"{before}{key}": value}
+    return leaves

@@ -83,6 +83,7 @@ class Config:
     seed: int = 1
     resume: str | None = None  # a checkpoint to go on from
     stage1: str | None = None  # the trained stage 1 for stage=membership
+    weights: str | None = None  # a checkpoint whose network stage 1 begins with, of other scans or simulated ones
     dataset: Any = None
     augment: Any = None
     extent: Any = None

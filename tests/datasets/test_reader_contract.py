@@ -54,7 +54,7 @@ def test_splits_list_their_frames_in_order(reader: Reader, split: str) -> None:
 def test_key_frames_are_frames(reader: Reader, frame: Frame) -> None:
     frames = reader.frames_of(frame.sequence)
     assert frames == sorted(set(frames))
-    assert set(reader.key_frames(frame.sequence)) <= set(frames)
+    assert set(reader.key_frames(frame.sequence)) <= set(reader.annotated(frame.sequence)) <= set(frames)
 
 
 def test_labelled_frames_have_labels(reader: Reader) -> None:

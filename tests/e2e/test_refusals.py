@@ -131,6 +131,30 @@ def test_a_ladder_that_cannot_stand_is_refused(folder: Path, arguments: list[str
     assert not (folder / "tables").exists()
 
 
+@pytest.mark.parametrize(
+    ("command", "arguments", "said"),
+    [
+        (
+            "oracle",
+            ["grid=semantickitti_10cm"],
+            "grid: expected none with a checkpoint, which has its own, found grid=",
+        ),
+        ("oracle", ["inference.roi.margin=2"], "inference.roi.margin: expected none with a checkpoint"),
+        ("predict", ["input=tree", "split=test"], "split: expected none with input, whose scans belong to no dataset"),
+        ("predict", ["input=tree", "dataset.workers=0"], "dataset.workers: expected none with input"),
+        ("predict", ["input=tree", "dataset=nuscenes"], "dataset: expected none with input"),
+        ("predict", ["scans.period=0.2"], "scans.period: expected none without input=FOLDER"),
+    ],
+)
+def test_settings_that_cannot_act_are_refused(
+    folder: Path, checkpoint: Path, command: str, arguments: list[str], said: str
+) -> None:
+    """Neither the dataset nor the folder of scans is there: it is refused before anything is looked for."""
+    message = refused(folder, command, f"checkpoint={checkpoint}", "out=out", *arguments)
+    assert said in message
+    assert not (folder / "out").exists()
+
+
 def test_a_ladder_is_not_put_up_against_a_model_of_other_classes(folder: Path, checkpoint: Path) -> None:
     nuscenes_tree.write_tree(folder / "nuscenes", {"scene-0003": True})
     message = refused(folder, "oracle", "dataset=nuscenes", "dataset.root=nuscenes", f"checkpoint={checkpoint}")

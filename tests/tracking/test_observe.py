@@ -66,6 +66,15 @@ def test_points_that_are_not_finite_count_for_nothing():
     seen = observe(points, LABELS, THINGS).observations
     assert torch.allclose(seen.centres, torch.tensor([[0.5, 1.5, 0.5], [11, 0, 0], [0, 0, 0]]))
     assert seen.extents.isfinite().all()
+    assert seen.placed.tolist() == [True, True, False]
+
+
+def test_what_a_detection_claims_is_somewhere_even_without_a_finite_point():
+    points = POINTS.clone()
+    points[5] = torch.nan
+    seen = observe(points, LABELS, THINGS, FOUND, torch.where(LABELS.semantics == PERSON, 0, -1)).observations
+    assert seen.placed.all()
+    assert torch.equal(seen.centres[2], FOUND.centres[0])
 
 
 def test_a_sweep_without_things_has_no_segments():

@@ -49,7 +49,7 @@ class InstanceTables:
             yield self.table(sequence)
 
     def _load_or_build(self, sequence: str) -> InstanceTable:
-        frames, taxonomy = self.reader.key_frames(sequence), self.reader.taxonomy
+        frames, taxonomy = self.reader.annotated(sequence), self.reader.taxonomy
         label = (taxonomy.label.high, taxonomy.label.step)
         meaning = {"raw_ids": taxonomy.raw_ids, "things": taxonomy.things, "label": label}  # what a table depends on
         made_from = fingerprint(*self.reader.sources(sequence), meaning)

@@ -51,7 +51,11 @@ class Reader(Protocol):
         ...
 
     def key_frames(self, sequence: str) -> list[Frame]:
-        """The sweeps of one sequence that the dataset annotates, by number."""
+        """The sweeps of one sequence that are trained on, predicted and scored, by number; all of them annotated."""
+        ...
+
+    def annotated(self, sequence: str) -> list[Frame]:
+        """The sweeps of one sequence that the dataset annotates, by number: what instance tables are made of."""
         ...
 
     def frames_of(self, sequence: str) -> list[Frame]:

@@ -113,18 +113,20 @@ class Peaks:
     detector: PeakDetector
     roi: RegionOfInterest
     things: list[int]
+    targets: HeatmapTargets  # how the network's were drawn
 
     def __call__(self, scene: Scene, truth: Truth) -> Scene:
         """Detect; centres, extents and velocities are the targets in the peaks' cells."""
         grid = scene.evidence.bev_grid
-        (found,) = self.detector(target_maps(truth.instances, grid, self.things), self.things, grid)
+        maps = target_maps(truth.instances, grid, self.things, self.targets)
+        (found,) = self.detector(maps, self.things, grid)
         owners = match_detections(found, self.roi.half_sizes(found.extents), truth.instances)
         return replace(scene, evidence=replace(scene.evidence, detections=found), owners=owners)
 
 
-def target_maps(instances: Instances, grid: BevGrid, things: list[int]) -> BevMaps:
+def target_maps(instances: Instances, grid: BevGrid, things: list[int], settings: HeatmapTargets) -> BevMaps:
     """Return the targets of one window as a network without error would write them."""
-    targets = bev_targets([instances], grid.lower, grid.cell, grid.shape, things, HeatmapTargets())
+    targets = bev_targets([instances], grid.lower, grid.cell, grid.shape, things, settings)
     _, x, y = targets.cells.unbind(1)
 
     def spread(values: Float[Tensor, "centres channels"]) -> Float[Tensor, "1 channels x y"]:

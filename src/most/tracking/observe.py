@@ -60,11 +60,11 @@ def _segments(panoptic: Panoptic, things: list[int]) -> tuple[Int64[Tensor, "seg
 def _by_points(
     points: Float[Tensor, "points 3"], classes: Int64[Tensor, "segments"], rows: Int64[Tensor, "points"]
 ) -> Observations:
-    """Observe segments by their finite points; one that has none is put at the sensor."""
+    """Observe segments by their finite points; one that has none is nowhere."""
     own = (rows >= 0) & points.isfinite().all(1)
     row, near, count = rows[own], points[own].double(), len(classes)
-    sizes = torch.bincount(row, minlength=count).clamp(min=1)
-    centres = near.new_zeros(count, 3).index_add_(0, row, near) / sizes[:, None]
+    sizes = torch.bincount(row, minlength=count)
+    centres = near.new_zeros(count, 3).index_add_(0, row, near) / sizes.clamp(min=1)[:, None]
     reach = torch.full_like(centres, SMALLEST)
     reach.scatter_reduce_(0, row[:, None].expand(-1, 3), (near - centres[row]).abs(), "amax")
     return Observations(
@@ -74,6 +74,7 @@ def _by_points(
         velocities=points.new_zeros(count, 2, dtype=torch.float32),
         velocity_known=torch.zeros_like(classes, dtype=torch.bool),
         scores=points.new_full((count,), UNDETECTED, dtype=torch.float32),
+        placed=sizes > 0,
     )
 
 
@@ -89,5 +90,6 @@ def _by_detections(
     lent.extents = bounds(lent.extents, lent.yaws)
     for name in ("centres", "extents", "velocities", "scores"):
         setattr(seen, name, getattr(seen, name).index_copy(0, found, getattr(lent, name).float()))
-    seen.velocity_known = seen.velocity_known.index_fill(0, found, value=True)
+    for name in ("velocity_known", "placed"):
+        setattr(seen, name, getattr(seen, name).index_fill(0, found, value=True))
     return seen

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
 from most.datasets.reader import Reader
-from most.errors import DataError
+from most.errors import check_entries
 from most.metrics.assignments import Assignments, assignments_path, read_assignments
 from most.modal.build import LabelRules, build_table
 from most.modal.extent import ShrinkWrap
@@ -41,11 +41,7 @@ def predicted_objects(
     beside = assignments_path(path)
     if beside.is_file():
         found = read_assignments(beside)
-        if len(found.assigned) != len(labels):
-            raise DataError(
-                f"{beside}: expected as many points as labels, {len(labels)}, found {len(found.assigned)}; "
-                "predict this scan again"
-            )
+        check_entries(beside, len(found.assigned), len(labels), "an entry")
         return _of_detections(found.detections, claimed_segments(found, segments))
     rules = _rules(reader, lambda raw: reader.taxonomy.decode(raw, path))
     table = build_table([replace(sweep, labels=labels)], rules)
