@@ -5,12 +5,12 @@ from typing import Any
 
 import torch
 
-from most.assembly import describe, describe_run, model_parts, read_checkpoint
-from most.config import Config
+from most.assembly import check_membership, describe, describe_run, model_parts, read_checkpoint, stage1_parts
+from most.config import Config, from_plain, to_plain
 from most.datasets.reader import Reader
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError
-from most.membership import Nearest, PointSegMLPSettings
+from most.membership import PointSegMLPSettings
 from most.stages.trainer import TrainerSettings
 from most.training import batches_per_step
 
@@ -32,8 +32,10 @@ def stages_to_run(config: Config, reader: Reader, folder: Path) -> list[str]:
         batches_per_step(config, name)
     if "membership" in names and not isinstance(config.membership, PointSegMLPSettings):
         raise ConfigError(
-            "membership: expected one that stage 2 can train, such as full, found nearest; with it say stage=detection"
+            "membership: expected one that stage 2 can train, such as full, found "
+            f"{to_plain('membership', config.membership)['component']}; with it say stage=detection"
         )
+    check_membership(model_parts(config) if "membership" in names else stage1_parts(config))
     if config.resume:
         return names[names.index(check_resume(config, reader, folder)) :]
     check_folder(folder)
@@ -64,6 +66,7 @@ def check_resume(config: Config, reader: Reader, folder: Path) -> str:
     """Return the stage that a run goes on with; refuse another model, other settings, or another folder."""
     path = Path(str(config.resume))
     saved = read_checkpoint(path)
+    saved["most"]["parts"] = up_to_date(saved["most"]["parts"])
     if "optimizer_states" not in saved:
         raise ConfigError(
             f"resume: expected a checkpoint to go on from, such as STAGE-last.ckpt, found weights alone: {path}"
@@ -71,7 +74,7 @@ def check_resume(config: Config, reader: Reader, folder: Path) -> str:
     stage: str = saved["most_run"]["stage"]
     if stage not in config.stage.run:
         raise ConfigError(f"resume: {path} is of stage {stage}; expected one of {', '.join(config.stage.run)}")
-    parts = model_parts(config) | ({"membership": Nearest()} if stage == "detection" else {})
+    parts = stage1_parts(config) if stage == "detection" else model_parts(config)
     expected = {
         "most": describe(parts, reader.taxonomy, config.dataset.sweeps),
         "most_run": describe_run(config, stage, reader.frames("train")),
@@ -103,13 +106,19 @@ def check_stage1(config: Config, taxonomy: Taxonomy) -> None:
     path = Path(config.stage1)
     saved, expected = read_checkpoint(path)["most"], describe(model_parts(config), taxonomy, config.dataset.sweeps)
     pairs = {name: (expected[name], saved[name]) for name in ("taxonomy", "sweeps")}
-    pairs |= {name: (expected["parts"][name], saved["parts"][name]) for name in STAGE1}
+    parts = up_to_date(saved["parts"])
+    pairs |= {name: (expected["parts"][name], parts[name]) for name in STAGE1}
     for name, (wanted, found) in pairs.items():
         if wanted != found:
             raise ConfigError(
                 f"stage1: {path} was trained with another {name}: expected {wanted}, found {found}; "
                 "repeat the settings that stage 1 was trained with"
             )
+
+
+def up_to_date(parts: dict[str, Any]) -> dict[str, Any]:
+    """Return a checkpoint's components with the settings that came after it, at their defaults."""
+    return {group: to_plain(group, from_plain(group, plain)) for group, plain in parts.items()}
 
 
 def _flat(settings: dict[str, Any], before: str = "") -> dict[str, Any]:

@@ -20,15 +20,32 @@ from most.datasets.nuscenes import NuScenesSettings
 from most.datasets.semantickitti import SemanticKITTISettings
 from most.encoder import PointEncoder
 from most.errors import ConfigError
-from most.heads import CentreHead, SemanticHead
+from most.heads import CentreHead, OffsetHead, SemanticHead
 from most.inference import Inference
 from most.logs import LoggerSettings
-from most.membership import Nearest, PointSegMLPSettings
+from most.membership import Clustering, MeanShift, Nearest, PointSegMLPSettings
 from most.modal.extent import ShrinkWrap, TrackMax
 from most.stages.settings import StageSettings
 from most.stages.trainer import TrainerSettings
 from most.tracking import TrackerSettings
 from most.voxels import Grid
+
+
+@dataclass
+class Heads:
+    """What reads the backbone's features: modal centres are detected."""
+
+    centre: CentreHead = field(default_factory=CentreHead)
+    semantic: SemanticHead = field(default_factory=SemanticHead)
+
+
+@dataclass
+class OffsetHeads:
+    """What reads the backbone's features: offsets to modal centres are regressed (DS-Net, Table I)."""
+
+    centre: OffsetHead = field(default_factory=OffsetHead)
+    semantic: SemanticHead = field(default_factory=SemanticHead)
+
 
 COMPONENTS: dict[str, dict[str, type]] = {
     "dataset": {"semantickitti": SemanticKITTISettings, "nuscenes": NuScenesSettings},
@@ -41,23 +58,21 @@ COMPONENTS: dict[str, dict[str, type]] = {
         "asymmetric_unet_small": AsymmetricUNetSmallSettings,
         "residual_unet": ResidualUNetSettings,
     },
-    "membership": {"nearest": Nearest, "point_seg_mlp": PointSegMLPSettings},
+    "heads": {"modal_centres": Heads, "offset_regression": OffsetHeads},
+    "membership": {
+        "nearest": Nearest,
+        "point_seg_mlp": PointSegMLPSettings,
+        "clustering": Clustering,
+        "mean_shift": MeanShift,
+    },
     "stage": {"stage": StageSettings},
     "trainer": {"trainer": TrainerSettings},
     "logger": {"logger": LoggerSettings},
-    "centre_head": {"centre_head": CentreHead},
+    "centre_head": {"centre_head": CentreHead, "offset_head": OffsetHead},
     "semantic_head": {"semantic_head": SemanticHead},
     "inference": {"inference": Inference},
     "tracker": {"tracker": TrackerSettings},
 }
-
-
-@dataclass
-class Heads:
-    """What reads the backbone's features."""
-
-    centre: CentreHead = field(default_factory=CentreHead)
-    semantic: SemanticHead = field(default_factory=SemanticHead)
 
 
 @dataclass
@@ -81,7 +96,7 @@ class Config:
     grid: Any = None
     encoder: Any = None
     backbone: Any = None
-    heads: Heads = field(default_factory=Heads)
+    heads: Any = None
     membership: Any = None
     inference: Inference = field(default_factory=Inference)
     stage: Any = None

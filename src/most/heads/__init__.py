@@ -1,6 +1,7 @@
-"""Heads: modal centres in bird's-eye view, and classes of voxels and points."""
+"""Heads: modal centres in bird's-eye view or offsets to them, and classes of voxels and points."""
 
 from most.heads.centre import CentreHead, CentreMaps
+from most.heads.offset import OffsetHead, VoxelOffsets
 from most.heads.semantic import SemanticHead, SemanticLogits
 
-__all__ = ["CentreHead", "CentreMaps", "SemanticHead", "SemanticLogits"]
+__all__ = ["CentreHead", "CentreMaps", "OffsetHead", "SemanticHead", "SemanticLogits", "VoxelOffsets"]
