@@ -48,25 +48,33 @@ def linked(places: Ground, radius: float) -> Int64[np.ndarray, "points"]:
 def cut(middles: Ground, piece: Int64[np.ndarray, "cells"], box: Box, margin: float) -> list[np.ndarray]:
     """Return the parts of a piece (rows of ``middles``) that are small enough.
 
-    It is cut across the side that is the most too long, at its widest gap that leaves half a box on either side.
+    It is cut at its widest gap, but no crumbs off it. What is no wider than one object is a row of them, one behind the
+    other; what is wider may consist of neighbours either way.
     """
     axes, sides = smallest_rectangle(middles[piece])
-    excess = sides / box
-    worst = int(excess.argmax())
-    along = middles[piece] @ axes[worst]
-    if excess[worst] <= margin or np.ptp(along) == 0:
+    if (sides <= margin * box).all():
         return [piece]
-    upper = along > _gap(np.unique(along), box[worst] / 2)
+    in_line = sides[1] <= margin * box[1]
+    reserve = (box[0] if in_line else box[1]) / 2
+    gaps = [(*_widest_gap(middles[piece] @ axis, reserve), axis) for axis in (axes[:1] if in_line else axes)]
+    width, place, axis = max(gaps, key=lambda gap: gap[0])  # of equals the longer side's
+    if width == 0:
+        return [piece]
+    upper = middles[piece] @ axis > place
     return [part for half in (piece[~upper], piece[upper]) for part in cut(middles, half, box, margin)]
 
 
-def _gap(values: Float64[np.ndarray, "values"], reserve: float) -> float:
-    """Return the widest gap's middle between ascending values, ``reserve`` off their ends; of equals the innermost."""
+def _widest_gap(along: Float64[np.ndarray, "cells"], reserve: float) -> tuple[float, float]:
+    """Return how wide the widest gap is, ``reserve`` off both ends, and its middle; of equals the innermost."""
+    values = np.unique(along.round(6))
+    if len(values) == 1:
+        return 0.0, values[0]
     middle = (values[0] + values[-1]) / 2
-    lowest, highest = min(values[0] + reserve, middle), max(values[-1] - reserve, middle)
-    inside = (values[:-1] <= highest) & (values[1:] >= lowest)
-    centres, widths = ((values[1:] + values[:-1]) / 2)[inside], np.diff(values)[inside]
-    return float(centres[np.lexsort([abs(centres - middle), -widths.round(6)])[0]])
+    inside = values[:-1] <= max(values[-1] - reserve, middle)
+    inside &= values[1:] >= min(values[0] + reserve, middle)
+    centres, widths = ((values[1:] + values[:-1]) / 2)[inside], np.diff(values)[inside].round(6)
+    chosen = np.lexsort([abs(centres - middle), -widths])[0]
+    return float(widths[chosen]), float(centres[chosen])
 
 
 def smallest_rectangle(middles: Ground) -> tuple[Float64[np.ndarray, "2 2"], Float64[np.ndarray, "2"]]:
