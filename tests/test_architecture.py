@@ -24,6 +24,7 @@ COMPONENTS = {
     "panoptic": {"membership"},
     "tracking": set(),
     "metrics": {"datasets", "membership"},
+    "reports": {"metrics"},
     "simulation": {"datasets"},
 }
 ENTRY_POINTS = {
@@ -38,6 +39,7 @@ ENTRY_POINTS = {
     "velocity",
     "view",
     "oracle",
+    "report",
 }
 OUTER = {"entry", "config", "assembly", "training", "checks", "streaming", "predicting", "predicting_scans"}
 
