@@ -24,6 +24,7 @@ COMPONENTS = {
     "panoptic": {"membership"},
     "tracking": set(),
     "metrics": {"datasets", "membership"},
+    "reports": {"metrics"},
     "simulation": {"datasets"},
 }
 LAYERS = [  # above the components: each knows all that are before it; docs/architecture.md says the same
@@ -34,10 +35,11 @@ LAYERS = [  # above the components: each knows all that are before it; docs/arch
     ["assembly"],
     ["streaming", "training"],
     ["checks", "predicting"],
-    ["predicting_scans"],
+    ["predicting_scans", "sweeps"],
 ]
 COMMANDS = [
-    "compare", "draw", "evaluate", "oracle", "predict", "simulate", "submit", "track", "train", "velocity", "view",
+    "compare", "dashboard", "draw", "evaluate", "oracle", "predict", "report", "simulate", "submit", "track", "train",
+    "velocity", "view",
 ]  # fmt: skip
 
 
