@@ -3,14 +3,16 @@
 import errno
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import NoReturn
 
+from hydra.core.hydra_config import HydraConfig
+from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.errors import HydraException
 from omegaconf import DictConfig
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBaseException
 
-from most.errors import MostError
+from most.errors import ConfigError, MostError
 
 KEY_ERRORS = (ConfigAttributeError, ConfigKeyError)
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -53,6 +55,18 @@ def run(task: Callable[[], object]) -> None:
             raise
         place = error.filename or "an output file"
         end(f"{place}: expected to read or write it, found {error.strerror}; {advice[error.errno]}", 2)
+
+
+def refuse_idle(keys: Collection[str], why: str) -> None:
+    """Refuse settings under these keys that the user gave, though they cannot act; defaults are no mistake.
+
+    ``why`` goes on the sentence "expected none". Without Hydra nothing was given.
+    """
+    told = HydraConfig.get().overrides.task if HydraConfig.initialized() else []
+    for override in OverridesParser.create().parse_overrides(list(told)):
+        key = override.key_or_group
+        if any(key == idle or key.startswith(f"{idle}.") for idle in keys):
+            raise ConfigError(f"{key}: expected none {why}, found {override.input_line}; leave it out")
 
 
 def _message(error: MostError) -> str:

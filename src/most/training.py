@@ -11,22 +11,26 @@ from lightning.pytorch.callbacks import Callback, LearningRateMonitor, ModelChec
 from lightning.pytorch.loggers import Logger
 
 from most.assembly import (
+    STAGE1_RUN,
     build_membership,
     build_network,
     build_predictor,
     describe,
     describe_run,
     load_trained,
+    load_weights,
     model_parts,
+    read_checkpoint,
 )
 from most.config import Config
 from most.datasets.class_counts import class_counts
 from most.datasets.datamodule import SweepDataModule
 from most.datasets.reader import Reader
 from most.membership import Nearest, PointSegMLP
+from most.modal.extent import DropSmall
 from most.stages.callbacks import Throughput
 from most.stages.checkpoints import AtomicCheckpointIO, LastCheckpoint
-from most.stages.detection import DetectionStage
+from most.stages.detection import DetectionStage, DetectionTraining
 from most.stages.membership import MembershipStage
 from most.stages.stage import Stage
 from most.viz.callback import BevPictures
@@ -47,13 +51,24 @@ def build_stage(name: str, config: Config, data: SweepDataModule, stage1: Path) 
 def build_detection(config: Config, data: SweepDataModule) -> DetectionStage:
     """Make the network and wire it for stage 1, which knows no membership but the nearest centre."""
     taxonomy, parts = data.reader.taxonomy, model_parts(config) | {"membership": Nearest()}
-    predictor = build_predictor(build_network(parts, taxonomy), parts, taxonomy)
-    training = config.stage.detection
+    network = build_network(parts, taxonomy)
+    if config.weights is not None:
+        load_weights(network, "network", read_checkpoint(stage1_file(config, Path(config.weights)))["state_dict"])
+    predictor = build_predictor(network, parts, taxonomy)
+    training = detection_training(config)
     balanced = training.losses.class_balance > 0
     counts = class_counts(data.reader, "train") if balanced else torch.ones(taxonomy.num_classes, dtype=torch.long)
     scans = len(data.reader.frames("train"))
     steps = training.epochs * steps_per_epoch(config, scans)
     return DetectionStage(predictor, taxonomy, counts, training, _notes(config, "detection", parts, data.reader), steps)
+
+
+def detection_training(config: Config) -> DetectionTraining:
+    """Return stage 1's settings, with the targets that the extent strategy leaves out."""
+    training: DetectionTraining = config.stage.detection
+    if not isinstance(config.extent, DropSmall):
+        return training
+    return replace(training, targets=replace(training.targets, min_points=config.extent.min_points))
 
 
 def steps_per_epoch(config: Config, scans: int) -> int:
@@ -71,10 +86,11 @@ def batches_per_step(config: Config, stage: str) -> int:
 def build_membership_stage(config: Config, stage1: Path, reader: Reader) -> MembershipStage:
     """Read stage 1 from a checkpoint and put a new membership after it."""
     parts, taxonomy = model_parts(config), reader.taxonomy
-    predictor = replace(load_trained(stage1).predictor, settings=config.inference)
+    trained = load_trained(stage1)
+    predictor = replace(trained.predictor, settings=config.inference)
     membership = build_membership(parts, predictor.network, taxonomy)
     assert isinstance(membership, PointSegMLP)  # most.checks
-    notes = _notes(config, "membership", parts, reader)
+    notes = _notes(config, "membership", parts, reader) | {STAGE1_RUN: trained.stage1}
     return MembershipStage(predictor, membership, taxonomy, config.stage.membership, notes, config.seed)
 
 
