@@ -34,10 +34,10 @@ LAYERS = [  # above the components: each knows all that are before it; docs/arch
     ["assembly"],
     ["streaming", "training"],
     ["checks", "predicting"],
-    ["predicting_scans"],
+    ["predicting_scans", "sweeps"],
 ]
 COMMANDS = [
-    "compare", "draw", "evaluate", "oracle", "predict", "simulate", "submit", "track", "train", "velocity", "view",
+    "compare", "dashboard", "draw", "evaluate", "oracle", "predict", "simulate", "submit", "track", "train", "velocity", "view",
 ]  # fmt: skip
 
 
