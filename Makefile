@@ -38,7 +38,7 @@ demo: setup
 	$(RUN) -m most.simulate simulation=demo out=$(DEMO)/streets
 	$(RUN) -m most.train +experiment=sim_demo dataset.root=$(DEMO)/streets dataset.tables=$(DEMO)/tables \
 	  hydra.run.dir=$(DEMO)/run
-	$(RUN) -m most.predict checkpoint=$(MODEL) split=test out=$(DEMO)/nearest nearest=true $(STREETS)
+	$(RUN) -m most.predict checkpoint=$(MODEL) split=test out=$(DEMO)/nearest membership=nearest $(STREETS)
 	$(RUN) -m most.predict checkpoint=$(MODEL) split=test out=$(DEMO)/full $(STREETS)
 	$(RUN) -m most.evaluate predictions=$(DEMO)/nearest split=test out=$(DEMO)/nearest.json $(STREETS)
 	$(RUN) -m most.evaluate predictions=$(DEMO)/full split=test out=$(DEMO)/metrics.json $(STREETS)

@@ -17,7 +17,7 @@ COMPONENTS = {
     "normed_pair": {"norm", "normed_linear"},
     "encoder": {"voxels", "normed_linear", "normed_pair"},
     "backbones": {"norm", "sparse"},
-    "heads": {"norm"},
+    "heads": {"norm", "normed_linear"},
     "losses": {"modal"},
     "detections": {"voxels"},
     "membership": {"voxels", "normed_linear"},

@@ -108,7 +108,7 @@ def test_predictions_cover_every_point_and_are_scored(run):
     for name in ("pq", "sq", "rq", "pq_things", "pq_dagger", "miou", "membership_accuracy"):
         assert scores[name] == (trained[name] and pytest.approx(trained[name], abs=1e-6)), name
 
-    done = most(run, "predict", f"checkpoint={MODEL}", "split=val", "out=nearest", "nearest=true",
+    done = most(run, "predict", f"checkpoint={MODEL}", "split=val", "out=nearest", "membership=nearest",
                 "dataset=simulated", "dataset.root=streets", "dataset.workers=0", *SPLITS)  # fmt: skip
     assert done.returncode == 0, done.stderr
     done = most(run, "evaluate", "predictions=nearest", "split=val", "out=nearest.json", "dataset=simulated",

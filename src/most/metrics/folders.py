@@ -21,10 +21,10 @@ from most.metrics.sequences import LabelScores
 def evaluate_folder(reader: Reader, frames: Sequence[Frame], folder: Path, progress: bool = True) -> dict[str, Any]:
     """Score the predictions of ``frames``, in the order of time, in ``folder`` and return the report.
 
-    ``{"scans": ..., "panoptic": {pq, ..., membership_accuracy, membership_accuracy_contested, per_class}}``, with
-    ``lstq`` or ``tracking`` beside, see :class:`SequenceScores`. The membership accuracies are None unless the folder
-    also holds detections and the dataset its scans. Raises DataError for predictions that are missing or do not fit
-    the truth, and for a split without labels.
+    ``{"scans": ..., "panoptic": {pq, ..., membership_accuracy, membership_accuracy_contested, per_class, sums}}``, with
+    ``lstq`` or ``tracking`` beside, see :class:`SequenceScores`; ``sums`` as :mod:`most.metrics.split_sums` has it.
+    The membership accuracies are None unless the folder also holds detections and the dataset its scans. Raises
+    DataError for predictions that are missing or do not fit the truth, and for a split without labels.
     """
     paths = prediction_paths(reader, frames, folder)
     scores = _Scores(reader, _has_assignments(reader, frames, paths))
@@ -40,8 +40,8 @@ class _Scores:
 
     def __init__(self, reader: Reader, with_memberships: bool) -> None:
         self.reader, self.taxonomy = reader, reader.taxonomy
+        self.with_memberships = with_memberships
         self.labels = LabelScores(self.taxonomy)
-        self.memberships = MembershipCounts() if with_memberships else None
 
     def add(self, frame: Frame, path: Path) -> None:
         """Score one scan's prediction."""
@@ -49,16 +49,24 @@ class _Scores:
         check_fit(self.reader, frame, path, labels, truth)
         known = self.taxonomy.to_training(truth, "truth of " + str(path))
         semantics = self.taxonomy.decode(labels, path)
-        self.labels.update(frame.sequence, semantics, labels, known, truth)
-        if self.memberships is not None:
-            points = self.reader.sweep(frame).points[:, :3]
-            self.memberships += _memberships(assignments_path(path), points, semantics, truth, known, self.taxonomy)
+        points, memberships = self._points(frame), None
+        if points is not None and self.with_memberships:
+            memberships = _memberships(assignments_path(path), points, semantics, truth, known, self.taxonomy)
+        self.labels.update(frame.sequence, semantics, labels, known, truth, points, memberships)
+
+    def _points(self, frame: Frame) -> Float[Tensor, "points 3"] | None:
+        """Read where the points are, if the scan is there; memberships cannot do without."""
+        try:
+            return self.reader.sweep(frame).points[:, :3]
+        except DataError:
+            if self.with_memberships:
+                raise
+            return None
 
     def report(self) -> dict[str, Any]:
         """Return all sections."""
         report = self.labels.report()
-        unknown = {"membership_accuracy": None, "membership_accuracy_contested": None}
-        report["panoptic"] |= unknown if self.memberships is None else self.memberships.accuracies()
+        report["panoptic"]["sums"] = self.labels.plain_sums()
         return report
 
 
