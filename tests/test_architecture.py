@@ -37,7 +37,8 @@ LAYERS = [  # above the components: each knows all that are before it; docs/arch
     ["predicting_scans", "sweeps"],
 ]
 COMMANDS = [
-    "compare", "dashboard", "draw", "evaluate", "oracle", "predict", "simulate", "submit", "track", "train", "velocity", "view",
+    "compare", "dashboard", "draw", "evaluate", "oracle", "predict", "simulate", "submit", "track", "train",
+    "velocity", "view",
 ]  # fmt: skip
 
 
