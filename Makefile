@@ -63,7 +63,7 @@ velocity: setup
 
 # Rows of Table I and II. The paper's Table II stands on shrink-wrapped extents: its last row is the first one's of
 # Table I, and nearest centres are scored beside each. A row more is a word more.
-EXTENTS = shrink_wrap,track_max
+EXTENTS = shrink_wrap,drop_small,class_mean,track_max,amodal
 MEMBERSHIPS = geometric,geometric_bev
 EXPERIMENT_small = sim_ablation_small
 EXPERIMENT_full = sim_ablation

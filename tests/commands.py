@@ -48,6 +48,7 @@ COMMANDS = (
     "oracle",
     "velocity",
     "report",
+    "dashboard",
 )
 PRELOADED = [f"most.{command}" for command in COMMANDS]
 
