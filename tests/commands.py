@@ -7,6 +7,7 @@ import resource
 import runpy
 import subprocess
 import sys
+import threading
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -148,3 +149,4 @@ def _as_main(
     finally:
         sys.stdout.flush()
         sys.stderr.flush()
+        threading._shutdown()  # as an interpreter's end does, before it waits for processes: joblib's end by this

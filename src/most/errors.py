@@ -18,6 +18,15 @@ class DataError(MostError):
     """A file or folder that is missing or does not hold what its format says."""
 
 
+def check_entries(file: object, entries: int, points: int, what: str = "a label", whose: str = "scan") -> None:
+    """Refuse a file unless it has as many entries (labels, by default) as its scan has points."""
+    if entries != points:
+        raise DataError(
+            f"{file}: expected {what} for each of the {whose}'s {points} points, found {entries}; one of the two is "
+            "cut off, or of another scan or release: copy it again, or predict the scan again"
+        )
+
+
 class StoppedError(MostError):
     """The user stopped the work; the message says how to go on."""
 
@@ -25,6 +34,12 @@ class StoppedError(MostError):
         """``exit_code`` is 128 and the number of the signal, as shells report it."""
         super().__init__(message)
         self.exit_code = exit_code
+
+
+class FailedError(MostError):
+    """Jobs of a sweep failed; the message says which, and why."""
+
+    exit_code = 1
 
 
 @contextmanager

@@ -74,7 +74,7 @@ def test_predictions_cover_every_point_and_are_scored(run):
     for name in ("pq", "sq", "rq", "pq_things", "pq_dagger", "miou", "membership_accuracy"):
         assert scores[name] == (trained[name] and pytest.approx(trained[name], abs=1e-6)), name
 
-    done = most(run, "predict", f"checkpoint={MODEL}", "split=val", "out=nearest", "nearest=true",
+    done = most(run, "predict", f"checkpoint={MODEL}", "split=val", "out=nearest", "membership=nearest",
                 "dataset=simulated", "dataset.root=streets", "dataset.workers=0", *SPLITS)  # fmt: skip
     assert done.returncode == 0, done.stderr
     done = most(run, "evaluate", "predictions=nearest", "split=val", "out=nearest.json", "dataset=simulated",
@@ -161,6 +161,7 @@ def test_the_oracle_ladder_stands_on_a_model_or_on_none(run):
         done = most(run, "oracle", *told, *arguments)
         assert done.returncode == 0, done.stderr
         assert "everything, semantics by voxel" in done.stdout
+        assert "does not say how heat maps were drawn" not in done.stderr  # stage 2 knows what its stage 1 learned from
         assert all(len(line) <= 120 for line in done.stdout.splitlines())
     none, model = (json.loads((run / f"{name}.json").read_text())["rows"] for name in ("none", "ladder"))
     assert none["everything"] == model["everything"]
