@@ -38,7 +38,7 @@ demo: setup
 	$(RUN) -m most.simulate simulation=demo out=$(DEMO)/streets
 	$(RUN) -m most.train +experiment=sim_demo dataset.root=$(DEMO)/streets dataset.tables=$(DEMO)/tables \
 	  hydra.run.dir=$(DEMO)/run
-	$(RUN) -m most.predict checkpoint=$(MODEL) split=test out=$(DEMO)/nearest nearest=true $(STREETS)
+	$(RUN) -m most.predict checkpoint=$(MODEL) split=test out=$(DEMO)/nearest membership=nearest $(STREETS)
 	$(RUN) -m most.predict checkpoint=$(MODEL) split=test out=$(DEMO)/full $(STREETS)
 	$(RUN) -m most.evaluate predictions=$(DEMO)/nearest split=test out=$(DEMO)/nearest.json $(STREETS)
 	$(RUN) -m most.evaluate predictions=$(DEMO)/full split=test out=$(DEMO)/metrics.json $(STREETS)
@@ -63,7 +63,7 @@ velocity: setup
 
 # Rows of Table I and II. The paper's Table II stands on shrink-wrapped extents: its last row is the first one's of
 # Table I, and nearest centres are scored beside each. A row more is a word more.
-EXTENTS = shrink_wrap,track_max
+EXTENTS = shrink_wrap,drop_small,class_mean,track_max,amodal
 MEMBERSHIPS = geometric,geometric_bev
 EXPERIMENT_small = sim_ablation_small
 EXPERIMENT_full = sim_ablation

@@ -36,7 +36,20 @@ SIMULATE = [
     "simulation.sensor.columns=256",
 ]  # fmt: skip
 TRAIN = ["+experiment=sim_demo", "dataset.root=streets", "dataset.tables=tables", *SPLITS, *TINY]
-COMMANDS = ("train", "predict", "track", "evaluate", "compare", "submit", "simulate", "draw", "oracle", "velocity")
+COMMANDS = (
+    "train",
+    "predict",
+    "track",
+    "evaluate",
+    "compare",
+    "submit",
+    "simulate",
+    "draw",
+    "oracle",
+    "velocity",
+    "report",
+    "dashboard",
+)
 PRELOADED = [f"most.{command}" for command in COMMANDS]
 
 

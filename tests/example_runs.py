@@ -68,9 +68,14 @@ def example_run(
     """Write a run; with ``nearest``, the sums of nearest centres, it is one of both stages. Without ``sums``: none."""
     stages = ["detection"] if nearest is None else ["detection", "membership"]
     settings = {
-        "name": "example", "seed": seed, "dataset": {"root": f"somewhere/{seed}", "sweeps": 0}, "extent": {"floor": 0.05},
-        "backbone": {"widths": [4, 8]}, "heads": {}, "membership": {"widths": [4]}, "stage": {"run": stages},
-    } | config  # fmt: skip
+        "name": "example",
+        "seed": seed,
+        "dataset": {"root": f"somewhere/{seed}", "sweeps": 0},
+        "extent": {"floor": 0.05},
+        "backbone": {"widths": [4, 8]},
+        "membership": {"widths": [4]},
+        "stage": {"run": stages},
+    } | config
     choices = {"extent": extent, "membership": membership, "dataset": "simulated", "experiment": "sim_demo"}
     hydra = {"hydra": {"runtime": {"choices": choices}}}
     for name, content in {"config": settings, "hydra": hydra, "overrides": list(overrides)}.items():

@@ -17,13 +17,14 @@ COMPONENTS = {
     "normed_pair": {"norm", "normed_linear"},
     "encoder": {"voxels", "normed_linear", "normed_pair"},
     "backbones": {"norm", "sparse"},
-    "heads": {"norm"},
+    "heads": {"norm", "normed_linear"},
     "losses": {"modal"},
     "detections": {"voxels"},
     "membership": {"voxels", "normed_linear"},
     "panoptic": {"membership"},
     "tracking": set(),
     "metrics": {"datasets", "membership"},
+    "reports": {"metrics"},
     "simulation": {"datasets"},
 }
 LAYERS = [  # above the components: each knows all that are before it; docs/architecture.md says the same
@@ -34,10 +35,11 @@ LAYERS = [  # above the components: each knows all that are before it; docs/arch
     ["assembly"],
     ["streaming", "training"],
     ["checks", "predicting"],
-    ["predicting_scans"],
+    ["predicting_scans", "sweeps"],
 ]
 COMMANDS = [
-    "compare", "draw", "evaluate", "oracle", "predict", "simulate", "submit", "track", "train", "velocity", "view",
+    "compare", "dashboard", "draw", "evaluate", "oracle", "predict", "report", "simulate", "submit", "track", "train",
+    "velocity", "view",
 ]  # fmt: skip
 
 

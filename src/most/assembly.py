@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import torch
 from torch import nn
@@ -16,12 +16,11 @@ from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError, DataError
 from most.heads import CentreHead, OrientedCentreHead, SemanticHead
 from most.inference import Predictor
-from most.membership import Channels
+from most.membership import Channels, MeanShift, Membership, Nearest, PointSegMLPSettings
 from most.modal.amodal import Amodal
 from most.modal.extent import DropSmall
 from most.modal.heatmap import HeatmapTargets
-from most.network import Network
-from most.panoptic import Membership
+from most.network import Network, Trunk
 from most.voxels import Grid
 
 FORMAT = 3
@@ -35,24 +34,49 @@ def build_network(parts: dict[str, Any], taxonomy: Taxonomy) -> Network:
     grid: Grid = parts["grid"]
     encoder = parts["encoder"].build(grid)
     backbone = parts["backbone"].build(encoder.voxel_channels, grid.shape)
-    centre_head: CentreHead = parts["centre_head"]
-    semantic_head: SemanticHead = parts["semantic_head"]
+    centre_head, semantic_head = parts["centre_head"], cast(SemanticHead, parts["semantic_head"])
+    on_voxels = centre_head.gives == "offsets"
     return Network(
         grid,
         encoder,
         backbone,
-        centre_head.build(backbone.bev_channels, len(taxonomy.things)),
+        centre_head.build(backbone.voxel_channels if on_voxels else backbone.bev_channels, len(taxonomy.things)),
         semantic_head.build(
             taxonomy.num_classes - 1, backbone.voxel_channels, encoder.point_channels, backbone.bev_channels
         ),
+        build_trunk(parts, decoder=on_voxels) if parts["backbone"].separate else None,
     )
 
 
+def build_trunk(parts: dict[str, Any], decoder: bool) -> Trunk:
+    """Make another point encoder and backbone of the same kind, where detection shares none."""
+    encoder = parts["encoder"].build(parts["grid"])
+    return Trunk(encoder, parts["backbone"].build(encoder.voxel_channels, parts["grid"].shape, decoder))
+
+
 def build_membership(parts: dict[str, Any], network: Network, taxonomy: Taxonomy) -> Membership:
-    """Make the membership that goes with a network."""
-    point, bev = network.encoder.point_channels, network.backbone.bev_channels
-    made: Membership = parts["membership"].build(Channels(taxonomy.num_classes - 1, list(taxonomy.things), point, bev))
+    """Make the membership that goes with a network; one that needs what the network does not give is a ConfigError."""
+    check_membership(parts)
+    channels = Channels(
+        classes=taxonomy.num_classes - 1,
+        things=list(taxonomy.things),
+        point=network.encoder.point_channels,
+        bev=network.backbone.bev_channels,
+        boxes=[taxonomy.boxes[thing] for thing in taxonomy.things],
+    )
+    made: Membership = parts["membership"].build(channels)
     return made
+
+
+def check_membership(parts: dict[str, Any]) -> None:
+    """Refuse a membership of detected centres where offsets are regressed, and the other way round."""
+    needs, gives = parts["membership"].needs, parts["centre_head"].gives
+    if needs not in (None, gives):
+        heads = {"centres": "modal_centres", "offsets": "offset_regression"}
+        raise ConfigError(
+            f"membership: expected one that needs no {needs}, as the model's heads are {heads[gives]}, found "
+            f"{to_plain('membership', parts['membership'])['component']}; choose another, or heads={heads[needs]}"
+        )
 
 
 def build_predictor(network: Network, parts: dict[str, Any], taxonomy: Taxonomy) -> Predictor:
@@ -64,15 +88,23 @@ def build_predictor(network: Network, parts: dict[str, Any], taxonomy: Taxonomy)
 def model_parts(config: Config) -> dict[str, Any]:
     """Pick what a trained model consists of out of a training's configuration; amodal boxes have a yaw."""
     centre = config.heads.centre
+    turned = isinstance(config.extent, Amodal) and isinstance(centre, CentreHead)
     return {
         "grid": config.grid,
         "encoder": config.encoder,
         "backbone": config.backbone,
-        "centre_head": OrientedCentreHead(**vars(centre)) if isinstance(config.extent, Amodal) else centre,
+        "centre_head": OrientedCentreHead(**vars(centre)) if turned else centre,
         "semantic_head": config.heads.semantic,
         "membership": config.membership,
         "inference": config.inference,
     }
+
+
+def stage1_parts(config: Config) -> dict[str, Any]:
+    """Pick what stage 1 consists of; the nearest centre, or mean shift, stands in for what stage 2 is to train."""
+    parts = model_parts(config)
+    stand_in = Nearest() if parts["centre_head"].gives == "centres" else MeanShift()
+    return parts | ({"membership": stand_in} if isinstance(parts["membership"], PointSegMLPSettings) else {})
 
 
 def describe(parts: dict[str, Any], taxonomy: Taxonomy, sweeps: int) -> dict[str, Any]:
@@ -129,6 +161,7 @@ class Trained:
     predictor: Predictor
     taxonomy: Taxonomy
     sweeps: int  # previous sweeps in its window
+    parts: dict[str, Any] = field(default_factory=dict)  # the components it is made of, as named in ``GROUPS``
     stage1: dict[str, Any] = field(default_factory=dict)  # what ``describe_run`` said of stage 1; empty: not known
     targets: HeatmapTargets | None = None  # how the heat maps that it learned from were drawn; None: not known
 
@@ -169,13 +202,23 @@ def _assemble(description: dict[str, Any], state: dict[str, Any], stage1: dict[s
         module.eval()
     drawn = stage1.get("training", {}).get("targets")
     targets = None if drawn is None else HeatmapTargets(**drawn)
-    return Trained(predictor, taxonomy, description["sweeps"], stage1, targets)
+    return Trained(predictor, taxonomy, description["sweeps"], parts, stage1, targets)
 
 
 def load_weights(module: nn.Module, name: str, state: dict[str, Any]) -> None:
     """Give a part of a model the weights that a checkpoint's ``state_dict`` has under its name."""
     prefix = f"{name}."
     module.load_state_dict({key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)})
+
+
+def exchange_membership(trained: Trained, membership: Any) -> Trained:
+    """Return the model with another membership; one with weights of its own would not be trained: a ConfigError."""
+    if isinstance(membership, PointSegMLPSettings):
+        raise ConfigError("membership: expected one without training, such as nearest, found one that stage 2 trains")
+    predictor = trained.predictor
+    parts = trained.parts | {"membership": membership}
+    made = build_membership(parts, predictor.network, trained.taxonomy)
+    return replace(trained, predictor=replace(predictor, membership=made), parts=parts)
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:

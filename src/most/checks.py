@@ -6,14 +6,14 @@ from typing import Any
 
 import torch
 
-from most.assembly import describe, describe_run, model_parts, read_checkpoint
+from most.assembly import check_membership, describe, describe_run, model_parts, read_checkpoint, stage1_parts
 from most.config import Config, from_plain, from_settings, to_plain
 from most.datasets.augment import Augment
 from most.datasets.instances import check_extent
 from most.datasets.reader import Reader
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError
-from most.membership import Nearest, PointSegMLPSettings
+from most.membership import PointSegMLPSettings
 from most.modal.extent import DropSmall
 from most.stages.trainer import TrainerSettings
 from most.training import batches_per_step, stage1_file
@@ -40,8 +40,10 @@ def stages_to_run(config: Config, reader: Reader, folder: Path) -> list[str]:
     check_dropped(config)
     if "membership" in names and not isinstance(config.membership, PointSegMLPSettings):
         raise ConfigError(
-            "membership: expected one that stage 2 can train, such as full, found nearest; with it say stage=detection"
+            "membership: expected one that stage 2 can train, such as full, found "
+            f"{to_plain('membership', config.membership)['component']}; with it say stage=detection"
         )
+    check_membership(model_parts(config) if "membership" in names else stage1_parts(config))
     if config.resume:
         return names[names.index(check_resume(config, reader, folder)) :]
     check_folder(folder)
@@ -90,7 +92,7 @@ def check_resume(config: Config, reader: Reader, folder: Path) -> str:
     stage: str = saved["most_run"]["stage"]
     if stage not in config.stage.run:
         raise ConfigError(f"resume: {path} is of stage {stage}; expected one of {', '.join(config.stage.run)}")
-    parts = model_parts(config) | ({"membership": Nearest()} if stage == "detection" else {})
+    parts = stage1_parts(config) if stage == "detection" else model_parts(config)
     expected = {
         "most": describe(parts, reader.taxonomy, config.dataset.sweeps),
         "most_run": describe_run(config, stage, reader.frames("train")),

@@ -20,10 +20,10 @@ from most.datasets.nuscenes import NuScenesSettings
 from most.datasets.semantickitti import SemanticKITTISettings
 from most.encoder import PointEncoder
 from most.errors import ConfigError
-from most.heads import CentreHead, OrientedCentreHead, SemanticHead
+from most.heads import CentreHead, OffsetHead, OrientedCentreHead, SemanticHead
 from most.inference import Inference
 from most.logs import LoggerSettings
-from most.membership import Nearest, PointSegMLPSettings
+from most.membership import Clustering, MeanShift, Nearest, PointSegMLPSettings
 from most.modal.amodal import Amodal
 from most.modal.class_mean import ClassMean
 from most.modal.extent import DropSmall, ShrinkWrap, TrackMax
@@ -31,6 +31,23 @@ from most.stages.settings import StageSettings
 from most.stages.trainer import TrainerSettings
 from most.tracking import TrackerSettings
 from most.voxels import Grid
+
+
+@dataclass
+class Heads:
+    """What reads the backbone's features: modal centres are detected."""
+
+    centre: CentreHead = field(default_factory=CentreHead)
+    semantic: SemanticHead = field(default_factory=SemanticHead)
+
+
+@dataclass
+class OffsetHeads:
+    """What reads the backbone's features: offsets to modal centres are regressed (DS-Net, Table I)."""
+
+    centre: OffsetHead = field(default_factory=OffsetHead)
+    semantic: SemanticHead = field(default_factory=SemanticHead)
+
 
 COMPONENTS: dict[str, dict[str, type]] = {
     "dataset": {"semantickitti": SemanticKITTISettings, "nuscenes": NuScenesSettings},
@@ -49,23 +66,25 @@ COMPONENTS: dict[str, dict[str, type]] = {
         "asymmetric_unet_small": AsymmetricUNetSmallSettings,
         "residual_unet": ResidualUNetSettings,
     },
-    "membership": {"nearest": Nearest, "point_seg_mlp": PointSegMLPSettings},
+    "heads": {"modal_centres": Heads, "offset_regression": OffsetHeads},
+    "membership": {
+        "nearest": Nearest,
+        "point_seg_mlp": PointSegMLPSettings,
+        "clustering": Clustering,
+        "mean_shift": MeanShift,
+    },
     "stage": {"stage": StageSettings},
     "trainer": {"trainer": TrainerSettings},
     "logger": {"logger": LoggerSettings},
-    "centre_head": {"centre_head": CentreHead, "oriented_centre_head": OrientedCentreHead},
+    "centre_head": {
+        "centre_head": CentreHead,
+        "oriented_centre_head": OrientedCentreHead,
+        "offset_head": OffsetHead,
+    },
     "semantic_head": {"semantic_head": SemanticHead},
     "inference": {"inference": Inference},
     "tracker": {"tracker": TrackerSettings},
 }
-
-
-@dataclass
-class Heads:
-    """What reads the backbone's features."""
-
-    centre: CentreHead = field(default_factory=CentreHead)
-    semantic: SemanticHead = field(default_factory=SemanticHead)
 
 
 @dataclass
@@ -90,7 +109,7 @@ class Config:
     grid: Any = None
     encoder: Any = None
     backbone: Any = None
-    heads: Heads = field(default_factory=Heads)
+    heads: Any = None
     membership: Any = None
     inference: Inference = field(default_factory=Inference)
     stage: Any = None

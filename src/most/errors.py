@@ -18,15 +18,6 @@ class DataError(MostError):
     """A file or folder that is missing or does not hold what its format says."""
 
 
-def check_entries(file: object, entries: int, points: int, what: str = "a label", whose: str = "scan") -> None:
-    """Refuse a file unless it has as many entries (labels, by default) as its scan has points."""
-    if entries != points:
-        raise DataError(
-            f"{file}: expected {what} for each of the {whose}'s {points} points, found {entries}; one of the two is "
-            "cut off, or of another scan or release: copy it again, or predict the scan again"
-        )
-
-
 class StoppedError(MostError):
     """The user stopped the work; the message says how to go on."""
 
@@ -49,3 +40,12 @@ def named(place: object) -> Iterator[None]:
         yield
     except DataError as error:
         raise DataError(f"{place}: {error}") from error
+
+
+def check_entries(file: object, entries: int, points: int, what: str = "a label", whose: str = "scan") -> None:
+    """Refuse a file unless it has as many entries (labels, by default) as its scan has points."""
+    if entries != points:
+        raise DataError(
+            f"{file}: expected {what} for each of the {whose}'s {points} points, found {entries}; one of the two is "
+            "cut off, or of another scan or release: copy it again, or predict the scan again"
+        )

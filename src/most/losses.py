@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Float, Int64
+from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -80,6 +80,13 @@ def focal_loss(
     missed = (1 - probability) ** 2 * probability.log()
     invented = (1 - target) ** 4 * probability**2 * (1 - probability).log()
     return mean_over_all(-torch.where(centre, missed, invented).sum(), centre.sum())
+
+
+def offset_loss(
+    offsets: Float[Tensor, "points 3"], targets: Float[Tensor, "points 3"], known: Bool[Tensor, "points"]
+) -> Float[Tensor, ""]:
+    """L1 of the offsets to modal centres (DS-Net), averaged over the points whose instance is known."""
+    return mean_over_all((offsets - targets)[known].float().abs().sum(), known.sum())
 
 
 def regression_losses(maps: BevMaps, targets: BevTargets) -> dict[str, Float[Tensor, ""]]:

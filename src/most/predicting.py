@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from most.assembly import check_taxonomy
 from most.claims import claim
+from most.config import to_plain
 from most.datasets.reader import Frame, Reader
 from most.datasets.window_stream import WindowStream
 from most.datasets.windows import Window
@@ -43,11 +44,11 @@ def claim_folder(out: Path, model: Mapping[str, Any], scans: Mapping[str, Any]) 
     claim(out, RECORD, {**model, **scans}, "predictions of another checkpoint, membership, tracker or of other scans")
 
 
-def describe_model(checkpoint: Path, nearest: bool, tracker: TrackerSettings) -> dict[str, Any]:
-    """Return what predictions depend on besides the scans, in plain types."""
+def describe_model(checkpoint: Path, membership: Any, tracker: TrackerSettings) -> dict[str, Any]:
+    """Return what predictions depend on besides the scans, in plain types; ``membership`` None is the checkpoint's."""
     return {
         "checkpoint_sha256": hashlib.sha256(checkpoint.read_bytes()).hexdigest(),
-        "membership": "nearest" if nearest else "trained",
+        "membership": "trained" if membership is None else to_plain("membership", membership),
         "tracker": asdict(tracker),
     }
 

@@ -121,8 +121,14 @@ class Detections(Rows):
     scores: Float[Tensor, "detections"]  # in [0, 1]
     centres: Float[Tensor, "detections 3"]  # m
     extents: Float[Tensor, "detections 3"]  # half-sizes, m
-    velocities: Float[Tensor, "detections 2"]  # m/s
+    velocities: Float[Tensor, "detections 2"]  # m/s; NaN where unknown
     yaws: Float[Tensor, "detections"] | None = None  # from x to where ``extents`` lie along; None: along the axes
+
+    @staticmethod
+    def none(like: Tensor) -> "Detections":
+        """Detections of a sweep in which there are none, where ``like`` lies and of its kind."""
+        row = like.new_zeros(0, 3)
+        return Detections(row[:, 0].long(), row[:, 0], row, row, row[:, :2])
 
 
 @dataclass

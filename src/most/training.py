@@ -21,13 +21,14 @@ from most.assembly import (
     load_weights,
     model_parts,
     read_checkpoint,
+    stage1_parts,
     training_of,
 )
 from most.config import Config
 from most.datasets.class_counts import class_counts
 from most.datasets.datamodule import SweepDataModule
 from most.datasets.reader import Reader
-from most.membership import Nearest, PointSegMLP
+from most.membership import PointSegMLP
 from most.stages.callbacks import Throughput
 from most.stages.checkpoints import AtomicCheckpointIO, LastCheckpoint
 from most.stages.detection import DetectionStage, DetectionTraining
@@ -49,8 +50,8 @@ def build_stage(name: str, config: Config, data: SweepDataModule, stage1: Path) 
 
 
 def build_detection(config: Config, data: SweepDataModule) -> DetectionStage:
-    """Make the network and wire it for stage 1, which knows no membership but the nearest centre."""
-    taxonomy, parts = data.reader.taxonomy, model_parts(config) | {"membership": Nearest()}
+    """Make the network and wire it for stage 1, which knows no membership that has to be trained."""
+    taxonomy, parts = data.reader.taxonomy, stage1_parts(config)
     network = build_network(parts, taxonomy)
     if config.weights is not None:
         load_weights(network, "network", read_checkpoint(stage1_file(config, Path(config.weights)))["state_dict"])

@@ -9,6 +9,7 @@ import torch
 
 import nuscenes_tree
 from commands import SPLITS, TINY, Done, Signal, most
+from most.sweeps import by_key, job_name
 from semantickitti_tree import write_sequence
 
 SETTINGS = ["+experiment=sim_demo", "dataset.root=tree", "dataset.tables=tables", *SPLITS, *TINY, "logger=none",
@@ -53,7 +54,8 @@ def continued(killed: Path) -> Path:
     assert (first / "metrics.json").is_file()
     assert not (second / "metrics.json").exists()
     assert (second / "checkpoints" / "detection-last.ckpt").is_file()
-    third = first.with_name(first.name.replace(NAMES[0], NAMES[2]))
+    told = by_key([*SETTINGS, "stage=detection", "extent=track_max", "seed=1"])
+    third = first.with_name(job_name([f"{key}={value}" for key, value in told.items()]))
     third.mkdir()
     (third / "checkpoints").touch()
     os.utime(first / "metrics.json", (0, 0))
@@ -90,10 +92,9 @@ def test_a_sweep_goes_on_with_what_is_missing_and_no_job_takes_others_along(cont
 def test_memberships_share_one_stage_1_that_a_runs_folder_names(continued):
     """Each seed's own, by processes that submitit starts."""
     pytest.importorskip("hydra_plugins.hydra_submitit_launcher")
-    stage1 = str(jobs(continued)[NAMES[2]].relative_to(continued)).replace("seed=1", "seed=${seed}")
-    stage1 = stage1.replace("stage", r"stage")
+    (continued / "stage1_1").symlink_to(jobs(continued)[NAMES[2]])
     done = most(continued, "train", "-m", *SETTINGS, "hydra.sweep.dir=stage2", "stage=membership", "seed=1",
-                "extent=track_max", "membership=geometric,full", f"stage1='{stage1}'",
+                "extent=track_max", "membership=geometric,full", "stage1=stage1_${seed}",
                 "hydra/launcher=submitit_local")  # fmt: skip
     assert done.returncode == 0, done.stderr
     made = sorted((continued / "stage2").glob("extent=*/checkpoints/*"))

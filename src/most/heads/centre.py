@@ -20,6 +20,8 @@ class CentreHead:
     channels: int = 64
     heatmap_bias: float = -2.19  # sigmoid(-2.19) = 0.1: few cells hold a centre
 
+    gives = "centres"
+
     def __post_init__(self) -> None:
         if self.channels < 1:
             raise ConfigError(f"heads.centre.channels: expected a positive number, found {self.channels}")

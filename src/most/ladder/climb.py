@@ -86,8 +86,7 @@ class Climber:
         """Return the labels as a submission holds them, numbered by tracks."""
         things, evidence = list(self.taxonomy.things), scene.evidence
         found = fuse(evidence, things, scene.membership, self.settings.roi, self.settings.fusion).to("cpu")
-        points, detections = evidence.points.cpu(), evidence.detections.to("cpu")
-        segments = observe(points, found.panoptic, things, detections, found.claimed)
+        segments = observe(evidence.points.cpu(), found.panoptic, things, found.detections, found.claimed)
         with named(f"{sweep.sequence}, scan {sweep.index}"):
             numbers = self.tracker.step(segments.observations, sweep.pose, sweep.time)
         return self.taxonomy.encode(found.panoptic.semantics, segments.rename(numbers))

@@ -85,7 +85,7 @@ class NoModel:
 
     def _nothing(self, sample: Sample) -> Evidence:
         points, grid = sample.points[: sample.num_current, :3], self.grid.bev(BEV_STRIDE)
-        void, rows = points.new_zeros(len(points), dtype=torch.long), points[:0]
+        void = points.new_zeros(len(points), dtype=torch.long)
         return Evidence(
             points=points,
             semantics=void,
@@ -93,5 +93,5 @@ class NoModel:
             point_features=points.new_zeros(len(points), 0),
             bev=points.new_zeros(0, *grid.shape),
             bev_grid=grid,
-            detections=Detections(void[:0], rows[:, 0], rows, rows, rows[:, :2]),
+            detections=Detections.none(points),
         )

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from most.detections import PeakDetector, decode
 from most.ladder.scene import Scene, Truth
-from most.membership import Evidence, Pairs, RegionOfInterest, match_detections, pair_targets
+from most.membership import Evidence, Pairs, Rating, RegionOfInterest, match_detections, pair_targets
 from most.modal.heatmap import HeatmapTargets
 from most.modal.targets import bev_targets
 from most.structures import BevMaps, Detections, Instances
@@ -94,7 +94,7 @@ def membership(scene: Scene, truth: Truth) -> Scene:
 
 
 @dataclass
-class TrueMembership:
+class TrueMembership(Rating):
     """Y_mem instead of O_mem (paper, Eq. 3)."""
 
     truth: Truth

@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from most.errors import ConfigError
 from most.geometry.boxes import along
 from most.membership.evidence import Channels, Evidence
+from most.membership.rating import Rating
 from most.membership.roi import Pairs
 from most.normed_linear import NormedLinear
 
@@ -28,6 +29,8 @@ class PointSegMLPSettings:
     bev: bool = True  # F_bev at the point and at the centre
     point: bool = True  # F_point
 
+    needs = "centres"
+
     def __post_init__(self) -> None:
         if not self.widths or min(self.widths) < 1:
             raise ConfigError(f"membership.widths: expected at least one positive width, found {self.widths}")
@@ -37,7 +40,7 @@ class PointSegMLPSettings:
         return PointSegMLP(self, channels)
 
 
-class PointSegMLP(nn.Module):
+class PointSegMLP(nn.Module, Rating):
     """Rates pairs of points and centres; training takes :meth:`logits` of what :meth:`describe` says of a batch."""
 
     def __init__(self, settings: PointSegMLPSettings, channels: Channels) -> None:

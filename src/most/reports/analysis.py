@@ -1,5 +1,6 @@
 """Figures with intervals of a group's strategies, and differences between two under the same draws."""
 
+import math
 from collections.abc import Mapping
 from functools import cached_property
 
@@ -43,7 +44,8 @@ class Analysis:
 
     def _interval(self, runs: BySeed, key: str) -> Interval | None:
         if (drawn := self._drawn(runs, key)) is not None:
-            return self.resampling.interval(drawn)
+            found = self.resampling.interval(drawn)
+            return found if math.isfinite(found.value) else None
         official = [_reported(each, key) for each in runs.values()]
         known = [value for value in official if value is not None]
         return Interval(float(np.mean(known))) if known and len(known) == len(official) else None

@@ -9,6 +9,7 @@ five by a tenth.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float64
@@ -36,11 +37,11 @@ class Resampling:
 
     def of_sequences(self) -> Float64[np.ndarray, "draws sequences"]:
         """The same for all strategies and seeds."""
-        return _counts(self.sequences, self.draws, np.random.default_rng([self.seed, 0]))
+        return _counts(self.sequences, self.draws, (self.seed, 0))
 
     def of_seeds(self, seeds: int) -> Float64[np.ndarray, "draws seeds"]:
         """The same for all strategies with so many seeds."""
-        return _counts(seeds, self.draws, np.random.default_rng([self.seed, 1, seeds]))
+        return _counts(seeds, self.draws, (self.seed, 1, seeds))
 
     def over_seeds(self, figures: Float64[np.ndarray, "draws seeds"]) -> Float64[np.ndarray, "draws"]:
         """Mean figures over each draw's seeds."""
@@ -58,6 +59,7 @@ class Resampling:
         return Interval(value, float(low), float(high), float(((drawn > 0) + 0.5 * (drawn == 0)).mean()))
 
 
-def _counts(items: int, draws: int, random: np.random.Generator) -> Float64[np.ndarray, "draws items"]:
-    drawn = random.multinomial(items, np.full(items, 1 / items), draws)
+@lru_cache(maxsize=8)
+def _counts(items: int, draws: int, seed: tuple[int, ...]) -> Float64[np.ndarray, "draws items"]:
+    drawn = np.random.default_rng(seed).multinomial(items, np.full(items, 1 / items), draws)
     return np.concatenate([np.ones((1, items)), drawn])

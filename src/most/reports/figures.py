@@ -33,7 +33,10 @@ class Presence:
 
 
 def figures(sums: Sums, presence: Presence, weights: Float64[np.ndarray, "draws sequences"]) -> Figures:
-    """All figures of one run in each draw, fractions; ``pq/CLASS``, ``distance/BIN`` and ``points/BIN`` among them."""
+    """All figures of one run in each draw, fractions; ``distance/BIN`` and ``points/BIN`` among them.
+
+    ``pq/CLASS`` is there for the classes that the held-out sequences have.
+    """
     of_class = _of_classes(np.tensordot(weights, sums.counts, 1))
     there = {name: weights @ getattr(presence, name) > 0 for name in ("segments", "points")}
     ever = {name: getattr(presence, name).any(0) for name in there}
@@ -45,10 +48,10 @@ def figures(sums: Sums, presence: Presence, weights: Float64[np.ndarray, "draws 
             found[name + part] = _mean(values, here | ~known)
             found[f"{name}{part}_present"] = _mean(values, here)
     found["pq_dagger"] = _dagger(of_class, there, ever, sums.measured)
-    found |= {f"pq/{name}": of_class["pq"][:, index] for index, name in enumerate(sums.measured.classes) if index}
-    return (
-        found | _binned(sums, weights) | _memberships(sums, weights) | _tracking(sums, weights, of_class, found["miou"])
-    )
+    named = [(index, name) for index, name in enumerate(sums.measured.classes) if ever["segments"][index]]
+    found |= {f"pq/{name}": of_class["pq"][:, index] for index, name in named}
+    tracking = _tracking(sums, weights, of_class, found["miou"])
+    return found | _binned(sums, weights) | _memberships(sums, weights) | tracking
 
 
 def _of_classes(totals: Float64[np.ndarray, "draws 7 classes"]) -> dict[str, Float64[np.ndarray, "draws classes"]]:

@@ -15,11 +15,17 @@ IDS = re.compile(r'(\bid="|url\(#|href="#)')
 
 @dataclass(frozen=True)
 class Chapter:
-    """What one group of runs has to say."""
+    """What one group of runs has to say: what was exchanged, in tables and plots, then the benchmarks' tables."""
 
     title: str
-    tables: Sequence[Table]
+    ablations: Sequence[Table]
     plots: Sequence[Plot]
+    benchmarks: Sequence[Table]
+
+    @property
+    def tables(self) -> list[Table]:
+        """All of them."""
+        return [*self.ablations, *self.benchmarks]
 
 
 def page(title: str, summary: str, chapters: Sequence[Chapter], left_out: Mapping[str, str]) -> str:
@@ -35,8 +41,9 @@ def page(title: str, summary: str, chapters: Sequence[Chapter], left_out: Mappin
 
 
 def _chapter(key: str, chapter: Chapter) -> str:
-    parts = [_table(f"{key}-{table.name}", table) for table in chapter.tables]
+    parts = [_table(f"{key}-{table.name}", table) for table in chapter.ablations]
     parts += [_figure(f"{key}-{plot.name}", plot) for plot in chapter.plots]
+    parts += [_table(f"{key}-{table.name}", table) for table in chapter.benchmarks]
     return f'<section id="{key}" aria-labelledby="{key}-title"><h2 id="{key}-title">{escape(chapter.title)}</h2>\n' + (
         "\n".join(parts) + "\n</section>"
     )

@@ -82,7 +82,7 @@ def _bars(name: str, title: str, ablation: Ablation, analysis: Analysis, keys: d
 
 
 def _bar(axes: Axes, at: float, cell: Interval | None, seeds: Iterable[float], series: int, label: str | None) -> None:
-    if cell is None or cell.value != cell.value:
+    if cell is None:
         return
     values = [100 * value for value in seeds]
     axes.plot(values, [at] * len(values), ".", color=COLOURS[series], alpha=0.5, markersize=4)

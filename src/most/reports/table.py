@@ -45,7 +45,7 @@ class Table:
 
 def percent(cell: Interval | None, signed: bool = False) -> str:
     """A figure in percent, without its interval."""
-    if cell is None or cell.value != cell.value:
+    if cell is None:
         return "-"
     return f"{100 * cell.value:{'+' if signed else ''}.1f}"
 

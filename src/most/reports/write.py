@@ -47,7 +47,7 @@ def _chapters(groups: Sequence[Group], baseline: str | None, draws: int, seed: i
         for part in parts.values():
             tables += [ablation_table(part, analysis), difference_table(part, analysis, baseline)]
         known = [table for table in tables if table is not None]
-        chapters.append(Chapter(each.title, [*known, *benchmark_tables(analysis)], plots(parts, analysis)))
+        chapters.append(Chapter(each.title, known, plots(parts, analysis), benchmark_tables(analysis)))
     return chapters
 
 
@@ -64,8 +64,9 @@ def _files(chapters: Sequence[Chapter], left_out: Mapping[str, str], summary: st
     text, tex = [f"# {title}\n\n{summary} {METHOD}\n"], []
     for number, chapter in enumerate(chapters, start=1):
         before = "" if number == 1 else f"{number}_"
-        text += [f"## {chapter.title}\n", *map(markdown, chapter.tables)]
+        text += [f"## {chapter.title}\n", *map(markdown, chapter.ablations)]
         text += [f"![{plot.title}](plots/{before}{plot.name}.svg)\n\n{plot.meaning}\n" for plot in chapter.plots]
+        text += map(markdown, chapter.benchmarks)
         tex += [f"% {chapter.title}", *map(latex, chapter.tables)]
         files |= {f"tables/{before}{table.name}.csv": comma_separated(table) for table in chapter.tables}
         files |= {f"plots/{before}{plot.name}.svg": plot.svg.replace(INK, "#222") for plot in chapter.plots}
