@@ -175,7 +175,7 @@ def test_settings_that_came_after_a_checkpoint_are_at_their_defaults(config, rea
     config.resume, config.stage1, config.stage.run = None, str(path), ["membership"]
     check_stage1(config, TAXONOMY)
     config.backbone.separate = True
-    with pytest.raises(ConfigError, match="was trained with another backbone: .*'separate': True.*'separate': False"):
+    with pytest.raises(ConfigError, match=r"was trained with another backbone: .*'separate': True.*'separate': False"):
         check_stage1(config, TAXONOMY)
 
 
