@@ -7,6 +7,7 @@ import resource
 import runpy
 import subprocess
 import sys
+import threading
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +36,20 @@ SIMULATE = [
     "simulation.sensor.columns=256",
 ]  # fmt: skip
 TRAIN = ["+experiment=sim_demo", "dataset.root=streets", "dataset.tables=tables", *SPLITS, *TINY]
-COMMANDS = ("train", "predict", "track", "evaluate", "compare", "submit", "simulate", "draw", "oracle", "velocity")
+COMMANDS = (
+    "train",
+    "predict",
+    "track",
+    "evaluate",
+    "compare",
+    "submit",
+    "simulate",
+    "draw",
+    "oracle",
+    "velocity",
+    "report",
+    "dashboard",
+)
 PRELOADED = [f"most.{command}" for command in COMMANDS]
 
 
@@ -148,3 +162,4 @@ def _as_main(
     finally:
         sys.stdout.flush()
         sys.stderr.flush()
+        threading._shutdown()  # as an interpreter's end does, before it waits for processes: joblib's end by this

@@ -10,8 +10,9 @@ from most.assembly import FORMAT, check_taxonomy, describe, exchange_membership,
 from most.backbones import AsymmetricUNetSettings, AsymmetricUNetSmallSettings, ResidualUNetSettings
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError, DataError
-from most.heads import OffsetHead, SemanticHead
+from most.heads import OffsetHead, OrientedCentreHead, SemanticHead
 from most.membership import Clustering, MeanShift, Nearest, PointSegMLPSettings
+from most.modal.heatmap import HeatmapTargets
 from tiny import TAXONOMY, cloud, street, tiny_parts, tiny_predictor, window
 
 SAMPLES = [street(), window(cloud(40), cloud(20, 1))]
@@ -32,8 +33,8 @@ def save(folder: Path, content) -> Path:
 
 
 def tensors(prediction):
-    said = [*vars(prediction.panoptic).values(), *vars(prediction.detections).values(), prediction.roi]
-    return [each.nan_to_num(-99.0) for each in said]  # velocities of clusters are unknown
+    found = [*vars(prediction.panoptic).values(), *vars(prediction.detections).values(), prediction.roi]
+    return [value.nan_to_num(-99.0) for value in found if value is not None]  # velocities of clusters are NaN
 
 
 @pytest.mark.parametrize(
@@ -43,6 +44,7 @@ def tensors(prediction):
         {"backbone": AsymmetricUNetSettings(widths=[4, 4, 8, 8], bev_channels=8)},
         {"backbone": ResidualUNetSettings(widths=[4, 4, 8, 8], bev_channels=4), "semantic_head": SemanticHead(False)},
         {"membership": PointSegMLPSettings([4])},
+        {"centre_head": OrientedCentreHead(channels=8)},
         {"membership": Clustering(margin=1.5)},
         {"centre_head": OffsetHead(8), "membership": MeanShift(0.9)},
         {"backbone": ResidualUNetSettings(widths=[4, 4, 8, 8], bev_channels=4, separate=True)},
@@ -65,6 +67,40 @@ def test_a_loaded_model_predicts_bit_for_bit_what_the_saved_one_did(tmp_path, ch
     for before, after in zip(predictor(SAMPLES), trained.predictor(SAMPLES), strict=True):
         assert len(before.detections) > 0
         assert all(torch.equal(*pair) for pair in zip(tensors(before), tensors(after), strict=True))
+
+
+DRAWN = {"kind": "gaussian_radius", "min_variance": 1.0, "min_overlap": 0.2, "min_radius": 3, "min_points": 5}
+
+
+@pytest.mark.parametrize(
+    ("told", "targets"),
+    [
+        ({"most_run": {"stage": "detection", "training": {"targets": DRAWN}}}, HeatmapTargets(**DRAWN)),
+        (
+            {
+                "most_run": {"stage": "membership", "training": {}},
+                "most_stage1": {"stage": "detection", "training": {"targets": DRAWN}},
+            },
+            HeatmapTargets(**DRAWN),
+        ),
+        ({"most_run": {"stage": "membership", "training": {}}}, None),  # of a time when stage 2 did not say
+    ],
+)
+def test_a_checkpoint_of_either_stage_says_how_heat_maps_were_drawn(tmp_path, told, targets):
+    trained = load_trained(save(tmp_path, checkpoint(tiny_predictor()) | told))
+    assert trained.targets == targets
+    if targets is None:
+        with pytest.warns(UserWarning, match="does not say how heat maps were drawn: the default is taken"):
+            assert trained.likely_targets() == HeatmapTargets()
+    else:
+        assert trained.likely_targets() == targets
+
+
+@pytest.mark.parametrize("targets", [{"kind": "square"}, {"radius": 2}, 7])
+def test_heat_maps_that_cannot_be_drawn_are_refused(tmp_path, targets):
+    run = {"stage": "detection", "training": {"targets": targets}}
+    with pytest.raises(DataError, match=r"some\.ckpt: expected a model that this version of most can make"):
+        load_trained(save(tmp_path, checkpoint(tiny_predictor()) | {"most_run": run}))
 
 
 def test_a_checkpoint_without_a_later_setting_has_its_default(tmp_path):

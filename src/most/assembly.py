@@ -1,5 +1,6 @@
 """Putting the components together, and the checkpoint that takes them apart again."""
 
+import warnings
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -7,19 +8,23 @@ from pathlib import Path
 from typing import Any, cast
 
 import torch
+from torch import nn
 
 from most.config import Config, from_plain, to_plain
 from most.datasets.reader import Frame
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError, DataError
-from most.heads import SemanticHead
+from most.heads import CentreHead, OrientedCentreHead, SemanticHead
 from most.inference import Predictor
 from most.membership import Channels, MeanShift, Membership, Nearest, PointSegMLPSettings
+from most.modal.amodal import Amodal
+from most.modal.heatmap import HeatmapTargets
 from most.network import Network, Trunk
 from most.voxels import Grid
 
 FORMAT = 3
 KEYS = ("most_run", "state_dict")  # beside "most", which describes the model: what it was trained with, its weights
+STAGE1_RUN = "most_stage1"  # in a checkpoint of stage 2: the ``most_run`` of the stage 1 that it stands on
 GROUPS = ("grid", "encoder", "backbone", "centre_head", "semantic_head", "membership", "inference")
 
 
@@ -80,12 +85,14 @@ def build_predictor(network: Network, parts: dict[str, Any], taxonomy: Taxonomy)
 
 
 def model_parts(config: Config) -> dict[str, Any]:
-    """Pick what a trained model consists of out of a training's configuration."""
+    """Pick what a trained model consists of out of a training's configuration; amodal boxes have a yaw."""
+    centre = config.heads.centre
+    turned = isinstance(config.extent, Amodal) and isinstance(centre, CentreHead)
     return {
         "grid": config.grid,
         "encoder": config.encoder,
         "backbone": config.backbone,
-        "centre_head": config.heads.centre,
+        "centre_head": OrientedCentreHead(**vars(centre)) if turned else centre,
         "semantic_head": config.heads.semantic,
         "membership": config.membership,
         "inference": config.inference,
@@ -123,6 +130,7 @@ def describe_run(config: Config, stage: str, frames: Sequence[Frame]) -> dict[st
         "seed": config.seed,
         "batch_size": config.dataset.batch_size,
         "processes": config.trainer.processes(),
+        "weights": config.weights,
     }
 
 
@@ -145,13 +153,21 @@ class Trained:
     taxonomy: Taxonomy
     sweeps: int  # previous sweeps in its window
     parts: dict[str, Any] = field(default_factory=dict)  # the components it is made of, as named in ``GROUPS``
+    stage1: dict[str, Any] = field(default_factory=dict)  # what ``describe_run`` said of stage 1; empty: not known
+    targets: HeatmapTargets | None = None  # how the heat maps that it learned from were drawn; None: not known
+
+    def likely_targets(self) -> HeatmapTargets:
+        """Return how its heat maps were drawn; the default, with a warning, where the checkpoint does not say."""
+        if self.targets is None:
+            warnings.warn("the checkpoint does not say how heat maps were drawn: the default is taken", stacklevel=2)
+        return self.targets or HeatmapTargets()
 
 
 def load_trained(path: Path) -> Trained:
     """Read a checkpoint; a file that is none, of another version or of another taxonomy, is a DataError."""
     checkpoint = read_checkpoint(path)
     try:
-        return _assemble(checkpoint["most"], checkpoint["state_dict"])
+        return _assemble(checkpoint["most"], checkpoint["state_dict"], stage1_run(checkpoint))
     except (ConfigError, KeyError, TypeError, AttributeError, RuntimeError) as error:
         raise DataError(
             f"{path}: expected a model that this version of most can make, found another ({error}); "
@@ -159,7 +175,13 @@ def load_trained(path: Path) -> Trained:
         ) from error
 
 
-def _assemble(description: dict[str, Any], state: dict[str, Any]) -> Trained:
+def stage1_run(checkpoint: dict[str, Any]) -> dict[str, Any]:
+    """Return what stage 1 of a checkpoint was trained with; nothing where one of stage 2 does not say."""
+    run: dict[str, Any] = checkpoint["most_run"]
+    return run if run.get("stage") == "detection" else checkpoint.get(STAGE1_RUN, {})
+
+
+def _assemble(description: dict[str, Any], state: dict[str, Any], stage1: dict[str, Any]) -> Trained:
     """Make the model that ``describe`` described, and load its weights."""
     taxonomy = Taxonomy.load(description["taxonomy"]["name"])
     if describe_taxonomy(taxonomy) != description["taxonomy"]:
@@ -167,10 +189,17 @@ def _assemble(description: dict[str, Any], state: dict[str, Any]) -> Trained:
     parts = {group: from_plain(group, description["parts"][group]) for group in GROUPS}
     predictor = build_predictor(build_network(parts, taxonomy), parts, taxonomy)
     for name, module in predictor.modules().items():
-        prefix = f"{name}."
-        module.load_state_dict({key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)})
+        load_weights(module, name, state)
         module.eval()
-    return Trained(predictor, taxonomy, description["sweeps"], parts)
+    drawn = stage1.get("training", {}).get("targets")
+    targets = None if drawn is None else HeatmapTargets(**drawn)
+    return Trained(predictor, taxonomy, description["sweeps"], parts, stage1, targets)
+
+
+def load_weights(module: nn.Module, name: str, state: dict[str, Any]) -> None:
+    """Give a part of a model the weights that a checkpoint's ``state_dict`` has under its name."""
+    prefix = f"{name}."
+    module.load_state_dict({key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)})
 
 
 def exchange_membership(trained: Trained, membership: Any) -> Trained:

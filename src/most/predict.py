@@ -5,14 +5,13 @@ from pathlib import Path
 from typing import Any
 
 import hydra
-import torch
 from omegaconf import MISSING, DictConfig
 
 from most.assembly import exchange_membership, load_trained
 from most.config import conf_dir, register, store_root, typed
 from most.datasets.scan_folder import ScanFolder, ScanFolderSettings
-from most.entry import run, start
-from most.errors import ConfigError
+from most.device import chosen_device
+from most.entry import refuse_idle, run, start
 from most.predicting import describe_model, predict_split
 from most.predicting_scans import predict_scans
 from most.streaming import PanopticTracker
@@ -33,14 +32,7 @@ class PredictConfig:
     device: str = "auto"  # auto: a GPU where there is one
 
     def __post_init__(self) -> None:
-        self.chosen_device()
-
-    def chosen_device(self) -> torch.device:
-        """Return where to predict; one that is not there is a ConfigError."""
-        there = torch.cuda.is_available()
-        if self.device not in ("auto", "cpu", *(["cuda"] if there else [])):
-            raise ConfigError(f"device: expected auto, cpu, or cuda where there is a GPU, found {self.device}")
-        return torch.device("cuda" if there and self.device != "cpu" else "cpu")
+        chosen_device(self.device)
 
 
 register()
@@ -49,11 +41,15 @@ store_root("predict", PredictConfig)
 
 def predict(config: PredictConfig) -> None:
     """Write labels with the numbers of tracks, and detections beside them, to the folder ``out``."""
+    if config.input is None:
+        refuse_idle(("scans",), "without input=FOLDER, whose scans they are about")
+    else:
+        refuse_idle(("dataset", "split"), "with input, whose scans belong to no dataset")
     checkpoint = Path(config.checkpoint)
     trained = load_trained(checkpoint)
     if config.membership is not None:
         trained = exchange_membership(trained, config.membership)
-    model = PanopticTracker(trained, config.tracker, config.chosen_device())
+    model = PanopticTracker(trained, config.tracker, chosen_device(config.device))
     described = describe_model(checkpoint, config.membership, config.tracker)
     if config.input is None:
         reader, ahead = config.dataset.reader(), config.dataset.workers > 0

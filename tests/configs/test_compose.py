@@ -20,6 +20,7 @@ REQUIRED = {
     "view": ["predictions=a", "sequence='08'"],
     "track": ["predictions=a", "out=b"],
     "velocity": ["velocity=a", "nearest=b"],
+    "report": ["runs=a"],
 }
 
 

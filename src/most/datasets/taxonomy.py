@@ -44,6 +44,11 @@ class LabelCode:
     step: int  # instance numbers are smaller; class ids too, where they are the low part
     unique_in: str  # "class" or "sequence": what two tracks must share for their numbers to differ
 
+    @property
+    def largest(self) -> int:
+        """The largest number of an instance."""
+        return self.step - 1
+
     def class_of(self, label: Int64[Tensor, "*points"]) -> Int64[Tensor, "*points"]:
         """The class id in a label."""
         return label // self.step if self.high == "class" else label % self.step
@@ -126,7 +131,7 @@ class Taxonomy:
         if ids.numel() and int(ids.min()) < 0:
             raise DataError(f"instance ids: expected numbers >= 0, found {int(ids.min())}")
         if ids.numel() and int(ids.max()) >= self.label.step:
-            ids = fit_numbers(semantics, ids, self.label.step - 1)
+            ids = fit_numbers(semantics, ids, self.label.largest)
         return self.label.join(self._written_ids.to(semantics.device)[semantics], ids)
 
     def decode(self, labels: Int64[Tensor, "*points"], source: object = "labels") -> Int64[Tensor, "*points"]:

@@ -41,11 +41,11 @@ class Ladder:
         tracker: TrackerSettings,
         device: torch.device | str = "cpu",
     ) -> None:
-        """``device`` is the model's."""
+        """Everything but tracking and scoring happens on ``device``, where a model must be."""
         self.taxonomy, self.instances, self.look, self.device = taxonomy, instances, look, torch.device(device)
         self.ceilings: list[Ceiling] = ceilings(self.taxonomy)
         settings = look.settings
-        peaks = Peaks(settings.detector, settings.roi, list(self.taxonomy.things))
+        peaks = Peaks(settings.detector, settings.roi, list(self.taxonomy.things), look.targets)
         self.climbers = [Climber(rung, self.taxonomy, settings, tracker) for rung in rungs(look.has_model, peaks)]
 
     def add(self, window: Window) -> None:

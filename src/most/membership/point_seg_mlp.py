@@ -11,6 +11,7 @@ from jaxtyping import Float, Int64
 from torch import Tensor, nn
 
 from most.errors import ConfigError
+from most.geometry.boxes import along
 from most.membership.evidence import Channels, Evidence
 from most.membership.rating import Rating
 from most.membership.roi import Pairs
@@ -71,10 +72,11 @@ class PointSegMLP(nn.Module, Rating):
         return torch.cat(features, 1)
 
     def _geometry(self, evidence: Evidence, pairs: Pairs) -> Float[Tensor, "pairs 6"]:
-        """The point's position relative to the centre, in metres and in extents."""
-        detections = evidence.detections
-        away = evidence.points[pairs.points] - detections.centres[pairs.detections]
-        return torch.cat([away, away / detections.extents[pairs.detections].clamp(min=SMALLEST)], 1)
+        """The point's position relative to the centre, in metres, and in extents along the detection's axes."""
+        detections, rows = evidence.detections, pairs.detections
+        away = evidence.points[pairs.points] - detections.centres[rows]
+        turned = along(away, None if detections.yaws is None else detections.yaws[rows])
+        return torch.cat([away, turned / detections.extents[rows].clamp(min=SMALLEST)], 1)
 
     def _points(self, evidence: Evidence, points: Int64[Tensor, "used"]) -> Float[Tensor, "used features"]:
         features = [evidence.probabilities[points]]

@@ -4,6 +4,7 @@ from most.metrics.membership import MembershipCounts, membership_counts
 from most.metrics.panoptic import PanopticStatistics, panoptic_figures, panoptic_statistics, per_class
 from most.metrics.running import MembershipAccuracy, PanopticQuality
 from most.metrics.running_tracking import NuScenesLSTQ, PanopticTracking, SemanticKITTILSTQ
+from most.metrics.split_sums import SplitSums
 
 __all__ = [
     "MembershipAccuracy",
@@ -13,6 +14,7 @@ __all__ = [
     "PanopticStatistics",
     "PanopticTracking",
     "SemanticKITTILSTQ",
+    "SplitSums",
     "membership_counts",
     "panoptic_figures",
     "panoptic_statistics",

@@ -11,7 +11,7 @@ from tqdm import tqdm
 
 from most.datasets.reader import Frame, Reader
 from most.datasets.taxonomy import Taxonomy
-from most.errors import DataError
+from most.errors import DataError, check_entries
 from most.metrics.assignments import assignments_path, read_assignments
 from most.metrics.instances import find_instances
 from most.metrics.membership import MembershipCounts, membership_counts
@@ -21,10 +21,10 @@ from most.metrics.sequences import LabelScores
 def evaluate_folder(reader: Reader, frames: Sequence[Frame], folder: Path, progress: bool = True) -> dict[str, Any]:
     """Score the predictions of ``frames``, in the order of time, in ``folder`` and return the report.
 
-    ``{"scans": ..., "panoptic": {pq, ..., membership_accuracy, membership_accuracy_contested, per_class}}``, with
-    ``lstq`` or ``tracking`` beside, see :class:`SequenceScores`. The membership accuracies are None unless the folder
-    also holds detections and the dataset its scans. Raises DataError for predictions that are missing or do not fit
-    the truth, and for a split without labels.
+    ``{"scans": ..., "panoptic": {pq, ..., membership_accuracy, membership_accuracy_contested, per_class, sums}}``, with
+    ``lstq`` or ``tracking`` beside, see :class:`SequenceScores`; ``sums`` as :mod:`most.metrics.split_sums` has it.
+    The membership accuracies are None unless the folder also holds detections and the dataset its scans. Raises
+    DataError for predictions that are missing or do not fit the truth, and for a split without labels.
     """
     paths = prediction_paths(reader, frames, folder)
     scores = _Scores(reader, _has_assignments(reader, frames, paths))
@@ -40,29 +40,33 @@ class _Scores:
 
     def __init__(self, reader: Reader, with_memberships: bool) -> None:
         self.reader, self.taxonomy = reader, reader.taxonomy
+        self.with_memberships = with_memberships
         self.labels = LabelScores(self.taxonomy)
-        self.memberships = MembershipCounts() if with_memberships else None
 
     def add(self, frame: Frame, path: Path) -> None:
         """Score one scan's prediction."""
         truth, labels = self.reader.labels(frame), self.reader.read_prediction(path)
-        if len(labels) != len(truth):
-            raise DataError(
-                f"{path}: expected a label for each of the scan's {len(truth)} points, found {len(labels)}; "
-                "predict this scan again"
-            )
+        check_fit(self.reader, frame, path, labels, truth)
         known = self.taxonomy.to_training(truth, "truth of " + str(path))
         semantics = self.taxonomy.decode(labels, path)
-        self.labels.update(frame.sequence, semantics, labels, known, truth)
-        if self.memberships is not None:
-            points = self.reader.sweep(frame).points[:, :3]
-            self.memberships += _memberships(assignments_path(path), points, semantics, truth, known, self.taxonomy)
+        points, memberships = self._points(frame), None
+        if points is not None and self.with_memberships:
+            memberships = _memberships(assignments_path(path), points, semantics, truth, known, self.taxonomy)
+        self.labels.update(frame.sequence, semantics, labels, known, truth, points, memberships)
+
+    def _points(self, frame: Frame) -> Float[Tensor, "points 3"] | None:
+        """Read where the points are, if the scan is there; memberships cannot do without."""
+        try:
+            return self.reader.sweep(frame).points[:, :3]
+        except DataError:
+            if self.with_memberships:
+                raise
+            return None
 
     def report(self) -> dict[str, Any]:
         """Return all sections."""
         report = self.labels.report()
-        unknown = {"membership_accuracy": None, "membership_accuracy_contested": None}
-        report["panoptic"] |= unknown if self.memberships is None else self.memberships.accuracies()
+        report["panoptic"]["sums"] = self.labels.plain_sums()
         return report
 
 
@@ -77,6 +81,24 @@ def prediction_paths(reader: Reader, frames: Sequence[Frame], folder: Path) -> l
             "of which this is the first; check the folder and the split, or predict them"
         )
     return paths
+
+
+def check_fit(
+    reader: Reader, frame: Frame, path: Path, labels: Int64[Tensor, "labels"], truth: Int64[Tensor, "points"]
+) -> None:
+    """Refuse a prediction read from ``path`` that is no labelling of the truth's points.
+
+    Where the scan is there, which scoring does not need, it decides whether the truth's own file is at fault.
+    """
+    if len(labels) == len(truth):
+        return
+    try:
+        points = reader.num_points(frame)
+    except DataError:
+        points = len(truth)
+    if points != len(truth):
+        reader.sweep(frame)  # a DataError about the file of the truth
+    check_entries(path, len(labels), len(truth), whose="truth")
 
 
 def _has_assignments(reader: Reader, frames: Sequence[Frame], paths: Sequence[Path]) -> bool:
@@ -105,11 +127,7 @@ def _memberships(
 ) -> MembershipCounts:
     """Score the memberships of one scan, written to ``path``."""
     found = read_assignments(path)
-    if not len(found.assigned) == len(points) == len(truth):
-        raise DataError(
-            f"{path}: expected as many points as labels ({len(truth)}), found {len(found.assigned)} assigned, and "
-            f"{len(points)} in the scan"
-        )
+    check_entries(path, len(found.assigned), len(points), "an entry")
     instances = find_instances(points, truth, truth_semantics, taxonomy)
     return membership_counts(
         points, semantics, truth_semantics, truth, found.detections, found.roi, found.assigned, instances

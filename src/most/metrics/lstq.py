@@ -116,6 +116,15 @@ def lstq_per_class(statistics: TubeStatistics, class_names: Sequence[str]) -> di
     }
 
 
+def associate_by_sequence(statistics: TubeStatistics) -> dict[int, Association]:
+    """Compare the tubes of each sequence by themselves, as official: their sums and numbers add up."""
+    found = {}
+    for sequence in np.unique(np.concatenate([rows[:, 0] for rows in (statistics.truth, statistics.overlaps)])):
+        rows = (table[table[:, 0] == sequence] for table in (statistics.truth, statistics.pred, statistics.overlaps))
+        found[int(sequence)] = associate(TubeStatistics(statistics.confusion, *rows))
+    return found
+
+
 def _repaired_association(statistics: TubeStatistics, things: Sequence[int]) -> Association:
     """The association of true tubes of things alone, sharing points as sizes count them."""
     truth = statistics.truth[np.isin(statistics.truth[:, 1], list(things))]

@@ -66,22 +66,51 @@ def panoptic_statistics(
 
 def panoptic_statistics_of(overlaps: Overlaps, num_classes: int, min_points: int) -> PanopticStatistics:
     """The same from overlaps that are found already."""
-    known = overlaps.known
-    pred, truth = known.pred, known.truth
-    match = true_positives(known)
-    false = (known.pred_areas >= max(min_points, 1)) & (pred.classes != 0)
-    missed = known.truth_areas >= max(min_points, 1)
-    false[match.pred] = False
-    missed[match.truth] = False
-    match_class = truth.classes[match.truth]
-    iou_sum = np.bincount(match_class, match.iou, num_classes).astype(np.float64)  # it gives integers for no items
+    segments = outcomes(overlaps, min_points)
+    iou_sum = np.bincount(segments.tp, segments.match.iou, num_classes).astype(np.float64)  # integers for no items
     return PanopticStatistics(
         confusion=confusion_of(overlaps, num_classes),
         iou_sum=torch.from_numpy(iou_sum),
-        tp=torch.from_numpy(np.bincount(match_class, minlength=num_classes)),
-        fp=torch.from_numpy(np.bincount(pred.classes[false], minlength=num_classes)),
-        fn=torch.from_numpy(np.bincount(truth.classes[missed], minlength=num_classes)),
+        tp=torch.from_numpy(np.bincount(segments.tp, minlength=num_classes)),
+        fp=torch.from_numpy(np.bincount(segments.fp, minlength=num_classes)),
+        fn=torch.from_numpy(np.bincount(segments.fn, minlength=num_classes)),
     )
+
+
+@dataclass
+class Outcomes:
+    """What became of a scan's segments: matched, or counted as false or missed."""
+
+    overlaps: Overlaps  # of points whose truth is known
+    match: Matches
+    false: Int64[np.ndarray, "false"]  # indices of predicted segments
+    missed: Int64[np.ndarray, "missed"]  # indices of true segments
+
+    @property
+    def tp(self) -> Int64[np.ndarray, "matches"]:
+        """The class of each match."""
+        return self.overlaps.truth.classes[self.match.truth]
+
+    @property
+    def fp(self) -> Int64[np.ndarray, "false"]:
+        """The class of each false segment."""
+        return self.overlaps.pred.classes[self.false]
+
+    @property
+    def fn(self) -> Int64[np.ndarray, "missed"]:
+        """The class of each missed segment."""
+        return self.overlaps.truth.classes[self.missed]
+
+
+def outcomes(overlaps: Overlaps, min_points: int) -> Outcomes:
+    """Tell true positives from false positives and misses, which count from ``min_points`` known points on."""
+    known = overlaps.known
+    match = true_positives(known)
+    false = (known.pred_areas >= max(min_points, 1)) & (known.pred.classes != 0)
+    missed = known.truth_areas >= max(min_points, 1)
+    false[match.pred] = False
+    missed[match.truth] = False
+    return Outcomes(known, match, np.flatnonzero(false), np.flatnonzero(missed))
 
 
 def true_positives(known: Overlaps) -> Matches:

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from most.files import atomic_write
 from most.metrics.paper_tables import PaperRow
 
 WIDTH = 120  # of a terminal, characters
+NUMBERS = re.compile(r"\[[-+.,\w\s]*\]")  # a list of numbers takes one line
 COLUMNS = ("pq", "sq", "rq", "iou")
 COUNTS = ("tp", "fp", "fn")
 COMPARED = {
@@ -26,8 +28,8 @@ COMPARED = {
 def write_report(path: Path, report: Mapping[str, Any]) -> None:
     """Write a report as JSON, whole or not at all; what is not a number becomes null."""
     with atomic_write(path, "w") as file:
-        json.dump(_without_nan(report), file, indent=2, allow_nan=False)
-        file.write("\n")
+        text = json.dumps(_without_nan(report), indent=2, allow_nan=False)
+        file.write(NUMBERS.sub(lambda found: " ".join(found[0].split()), text) + "\n")
 
 
 def read_report(path: Path) -> dict[str, Any]:

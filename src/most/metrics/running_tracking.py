@@ -9,7 +9,7 @@ from jaxtyping import Int64
 from torch import Tensor
 
 from most.metrics.exact_sums import exact_parts, joined
-from most.metrics.lstq import lstq_nuscenes, lstq_per_class, lstq_semantickitti
+from most.metrics.lstq import Association, associate_by_sequence, lstq_nuscenes, lstq_per_class, lstq_semantickitti
 from most.metrics.overlaps import find_overlaps
 from most.metrics.panoptic import PanopticStatistics
 from most.metrics.running import COUNTS
@@ -53,6 +53,11 @@ class _LSTQ(TableMetric):
         """Return each class's figures, see :func:`most.metrics.lstq.lstq_per_class`; call it on every process."""
         with self.sync_context():
             return lstq_per_class(self._statistics(), self.class_names)
+
+    def by_sequence(self) -> dict[int, Association]:
+        """Return the association of each sequence that has tubes; call it on every process."""
+        with self.sync_context():
+            return associate_by_sequence(self._statistics())
 
     def _statistics(self) -> TubeStatistics:
         return TubeStatistics(self.confusion.cpu(), self.rows("truth"), self.rows("pred"), self.rows("overlaps"))

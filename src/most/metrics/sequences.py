@@ -2,12 +2,13 @@
 
 from typing import Any
 
-from jaxtyping import Int64
+from jaxtyping import Float, Int64
 from torch import Tensor
 
 from most.datasets.taxonomy import Taxonomy
-from most.metrics.panoptic import PanopticStatistics, panoptic_figures, panoptic_statistics, per_class
+from most.metrics.membership import MembershipCounts
 from most.metrics.running_tracking import NuScenesLSTQ, PanopticTracking, SemanticKITTILSTQ
+from most.metrics.split_sums import SplitSums
 
 
 class SequenceScores:
@@ -38,6 +39,13 @@ class SequenceScores:
         self.lstq.update(number, semantics, labels, truth_semantics, truth_labels)
         self.tracking.update(number, semantics, labels, truth_semantics, truth_labels)
 
+    def associations(self) -> dict[str, dict[str, list[float]]]:
+        """Return ``{assoc, tubes}`` by class of each sequence: what S_assoc is summed of."""
+        found, size = self.lstq.by_sequence(), self.taxonomy.num_classes
+        none = {"assoc": [0.0] * size, "tubes": [0] * size}
+        plain = {n: {"assoc": each.sums.tolist(), "tubes": each.tubes.tolist()} for n, each in found.items()}
+        return {name: plain.get(number, none) for name, number in self.numbers.items()}
+
     def report(self) -> dict[str, Any]:
         """Return the section ``lstq``, or on nuScenes ``tracking``, with ``per_class``; fractions in [0, 1]."""
         lstq = self.lstq.compute()
@@ -47,11 +55,10 @@ class SequenceScores:
 
 
 class LabelScores:
-    """All figures that labels alone decide; scans of a sequence are added in the order of time."""
+    """All figures of labels, and of memberships where they are known; scans of a sequence come in the order of time."""
 
     def __init__(self, taxonomy: Taxonomy) -> None:
-        self.taxonomy = taxonomy
-        self.panoptic = PanopticStatistics.zeros(taxonomy.num_classes)
+        self.sums = SplitSums(taxonomy)
         self.sequences = SequenceScores(taxonomy)
 
     def update(
@@ -61,14 +68,20 @@ class LabelScores:
         labels: Int64[Tensor, "points"],
         truth_semantics: Int64[Tensor, "points"],
         truth_labels: Int64[Tensor, "points"],
+        points: Float[Tensor, "points 3"] | None = None,
+        membership: MembershipCounts | None = None,
     ) -> None:
-        """Add a scan; labels are whole, as they are on disk."""
-        size, smallest = self.taxonomy.num_classes, self.taxonomy.min_points
-        self.panoptic += panoptic_statistics(semantics, labels, truth_semantics, truth_labels, size, smallest)
+        """Add a scan; labels are whole, as they are on disk, and ``points`` in the sensor frame (m)."""
+        self.sums.update(sequence, (semantics, labels), (truth_semantics, truth_labels), points, membership)
         self.sequences.update(sequence, semantics, labels, truth_semantics, truth_labels)
+
+    def plain_sums(self) -> dict[str, Any]:
+        """Return the section ``sums``, see :mod:`most.metrics.split_sums`, with what S_assoc is made of."""
+        section = self.sums.plain()
+        for name, tubes in self.sequences.associations().items():
+            section["sequences"][name] |= tubes
+        return section
 
     def report(self) -> dict[str, Any]:
         """Return the section ``panoptic`` with ``per_class``, and that of the 4D figures beside it."""
-        figures: dict[str, Any] = dict(panoptic_figures(self.panoptic, self.taxonomy.things))
-        classes = {"per_class": per_class(self.panoptic, self.taxonomy.class_names)}
-        return {"panoptic": figures | classes} | self.sequences.report()
+        return {"panoptic": self.sums.figures()} | self.sequences.report()

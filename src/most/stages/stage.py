@@ -25,7 +25,7 @@ class Stage(L.LightningModule):
         self.report: dict[str, Any] = {}  # the last validation's figures
 
     def publish(self, **figures: dict[str, Any]) -> None:
-        """Keep the figures of a validation, fractions in [0, 1], and log those that are not of one class.
+        """Keep the figures of a validation, fractions in [0, 1], and log those of the whole split.
 
         ``panoptic`` is logged as ``val/NAME``, any ``panoptic_WAY`` as ``val/WAY_NAME``.
         """
@@ -34,7 +34,7 @@ class Stage(L.LightningModule):
         for section, values in figures.items():
             way = section.removeprefix("panoptic").removeprefix("_")
             before = f"{self.prefix}val/{way}_" if way else f"{self.prefix}val/"
-            self.log_dict({before + name: value for name, value in values.items() if name != "per_class"})
+            self.log_dict({before + name: value for name, value in values.items() if isinstance(value, float)})
 
     def predict_step(self, samples: list[Sample], _: int) -> list[Prediction]:
         """Label every point of a batch's current sweeps."""

@@ -6,6 +6,7 @@ import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
+from most.geometry.boxes import bounds
 from most.geometry.segments import measure
 from most.structures import Detections, Observations, OnDevice, Panoptic
 
@@ -59,7 +60,7 @@ def _segments(panoptic: Panoptic, things: list[int]) -> tuple[Int64[Tensor, "seg
 def _by_points(
     points: Float[Tensor, "points 3"], classes: Int64[Tensor, "segments"], rows: Int64[Tensor, "points"]
 ) -> Observations:
-    """Observe segments by their finite points; one that has none is put at the sensor."""
+    """Observe segments by their finite points; one that has none is nowhere."""
     own = (rows >= 0) & points.isfinite().all(1)
     count = len(classes)
     centres, extents = measure(points[own], rows[own], count)
@@ -70,6 +71,7 @@ def _by_points(
         velocities=points.new_zeros(count, 2, dtype=torch.float32),
         velocity_known=torch.zeros_like(classes, dtype=torch.bool),
         scores=points.new_full((count,), UNDETECTED, dtype=torch.float32),
+        placed=torch.bincount(rows[own], minlength=count) > 0,
     )
 
 
@@ -82,8 +84,10 @@ def _by_detections(
     most, best = votes.reshape(len(seen), len(detections)).max(1)
     found = ((most > 0) & (detections.classes[best] == seen.classes)).nonzero().squeeze(1)
     lent = detections.select(best[found])
+    lent.extents = bounds(lent.extents, lent.yaws)
     for name in ("centres", "extents", "velocities", "scores"):
         setattr(seen, name, getattr(seen, name).index_copy(0, found, getattr(lent, name).float()))
+    seen.placed = seen.placed.index_fill(0, found, value=True)
     seen.velocity_known = seen.velocity_known.index_copy(0, found, lent.velocities.isfinite().all(1))
     seen.velocities = seen.velocities.nan_to_num(0.0)
     return seen

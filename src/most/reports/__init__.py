@@ -1,0 +1,1 @@
+"""Reports on finished runs: the paper's tables with intervals, from the runs' folders alone."""

@@ -1,0 +1,75 @@
+"""Which strategies of a group make the rows of Tables I and II."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from most.reports.analysis import BySeed
+from most.reports.groups import Group
+from most.reports.strategy import PAPER, Strategy
+
+AMODALIZATION = {
+    "PQ": "pq", "PQ Th": "pq_things", "PQ St": "pq_stuff",
+    "mIoU": "miou", "mIoU Th": "miou_things", "mIoU St": "miou_stuff", "PQ present": "pq_present",
+}  # fmt: skip
+MEMBERSHIP = {
+    "PQ": "pq", "mIoU": "miou", "Membership Acc": "membership_accuracy", "contested": "membership_accuracy_contested",
+    "PQ present": "pq_present",
+}  # fmt: skip
+PRESENT = (
+    "PQ present: the mean over the classes that the held-out sequences have; official means count absent ones as 0."
+)
+CONTESTED = "contested: membership accuracy of the points that lie in the regions of several objects alone."
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """One part of the method exchanged, all else held."""
+
+    name: str  # of the paper's table
+    title: str
+    rows: dict[str, Strategy]  # by the name that baseline=... has
+    columns: dict[str, str]
+    notes: tuple[str, ...]
+    first: str  # what differences are against unless another is chosen
+    beside: bool  # nearest centres are those of the runs that trained stage 2
+
+    def title_of(self, strategy: Strategy) -> str:
+        """A row's title."""
+        return strategy.title if self.name == "table1" else strategy.membership_title
+
+    def runs(self, group: Group, strategy: Strategy) -> BySeed:
+        """A row's runs."""
+        return group.by_seed(strategy, self.beside)
+
+
+def amodalization(group: Group) -> Ablation:
+    """Table I: with the membership that most strategies were scored with, the fullest of several.
+
+    Offsets have no detected centres, so theirs is their own.
+    """
+    by_membership = _by(group.strategies, lambda each: each.membership if each.heads == PAPER else "")
+    offsets = by_membership.pop("", [])
+    widest = max(by_membership.values(), key=lambda rows: (len(rows), rows[0].order[-2:]), default=[])
+    rows = {each.detection: each for each in [*offsets, *widest]}
+    ways = dict.fromkeys(each.membership_title for each in rows.values())
+    notes = (f"Membership here: {'; '.join(ways)}.", PRESENT)
+    title = "Table I: strategies for amodalization"
+    return Ablation("table1", title, rows, AMODALIZATION, notes, "shrink_wrap", beside=False)
+
+
+def memberships(group: Group) -> Ablation:
+    """Table II: on the stage 1 that most memberships were tried on, the paper's MAX of several."""
+    found = max(
+        _by(group.strategies, lambda each: each.detection).values(),
+        key=lambda rows: (len(rows), rows[0].extent == "track_max"),
+    )
+    notes = (f"Stage 1 here: {found[0].title}.", CONTESTED, PRESENT)
+    rows = {each.membership: each for each in found}
+    return Ablation("table2", "Table II: membership functions", rows, MEMBERSHIP, notes, "nearest", beside=True)
+
+
+def _by(strategies: Sequence[Strategy], key: Callable[[Strategy], str]) -> dict[str, list[Strategy]]:
+    found: dict[str, list[Strategy]] = {}
+    for each in strategies:
+        found.setdefault(key(each), []).append(each)
+    return found

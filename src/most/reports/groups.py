@@ -1,0 +1,96 @@
+"""Runs that may be compared: alike in all but strategy and seed, and measured on the same scans."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from most.errors import DataError
+from most.reports.runs import BESIDE, EVALUATED, VALIDATED, Scored
+from most.reports.strategy import AXES, Strategy
+from most.reports.sums import Measured
+
+ASIDE = {  # keys that say who ran it, where and how far it is; or that strategies need to differ in
+    *("seed", "resume", "stage1", "trainer", "logger", "paths", "dataset.root", "dataset.tables", "dataset.workers"),
+    *("dataset.cache", "stage.run", "backbone.separate", *AXES),
+}
+SOURCES = (EVALUATED, VALIDATED, BESIDE)  # of two for the same, the first is taken
+
+
+@dataclass
+class Group:
+    """Comparable runs; the paper's tables are made of one group at a time."""
+
+    title: str
+    dataset: str
+    measured: Measured
+    rows: dict[Strategy, dict[str, dict[int, Scored]]] = field(default_factory=dict)  # by source and seed
+
+    def add(self, scored: Scored) -> None:
+        """Add a run; two of the same strategy and seed are a DataError, since no one could say which counts."""
+        seeds = self.rows.setdefault(scored.strategy, {}).setdefault(scored.source, {})
+        other = seeds.setdefault(scored.seed, scored)
+        if other is not scored and scored.source != BESIDE:
+            raise DataError(
+                f"{scored.folder}: expected one run of {scored.strategy.detection}, membership "
+                f"{scored.strategy.membership}, seed {scored.seed}, found another in {other.folder}; keep one in runs"
+            )
+
+    def by_seed(self, strategy: Strategy, beside: bool = False) -> dict[int, Scored]:
+        """Return a strategy's runs from one source; ``beside``: rather those of the run that trained stage 2."""
+        sources = (EVALUATED, BESIDE, VALIDATED) if beside else SOURCES
+        return next(self.rows[strategy][source] for source in sources if source in self.rows[strategy])
+
+    @property
+    def strategies(self) -> list[Strategy]:
+        """In the paper's order."""
+        return sorted(self.rows, key=lambda strategy: strategy.order)
+
+
+def group(scored: list[Scored]) -> list[Group]:
+    """Part runs into groups, the one with most strategies first."""
+    groups: dict[str, Group] = {}
+    kept: dict[str, dict[str, Any]] = {}
+    for each in scored:
+        rest = common_part(each.config) | {"experiment": each.choices.get("experiment")}
+        key = json.dumps(rest, sort_keys=True, default=str) + repr(each.sums.measured)
+        if key not in groups:
+            kept[key] = rest
+            groups[key] = Group("", str(each.choices["dataset"]), each.sums.measured)
+        groups[key].add(each)
+    _entitle(groups, kept)
+    return sorted(groups.values(), key=lambda each: (-len(each.rows), each.title))
+
+
+def common_part(config: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """What has to agree, by dotted key."""
+    flat: dict[str, Any] = {}
+    for name, value in config.items():
+        key = prefix + str(name)
+        if key in ASIDE:
+            continue
+        flat |= common_part(value, f"{key}.") if isinstance(value, Mapping) else {key: value}
+    return flat
+
+
+def _entitle(groups: Mapping[str, Group], kept: Mapping[str, Mapping[str, Any]]) -> None:
+    """Name each group by its experiment, dataset and sequences, and by what tells it from the others."""
+    names = {name for rest in kept.values() for name in rest}
+    told = sorted(name for name in names if len({repr(rest.get(name)) for rest in kept.values()}) > 1)
+    for key, found in groups.items():
+        sequences = [name for name, _ in found.measured.sequences]
+        shown = ", ".join(sequences) if len(sequences) <= 6 else f"{sequences[0]} to {sequences[-1]}"
+        scans = sum(count for _, count in found.measured.sequences)
+        plural = "" if len(sequences) == 1 else "s"
+        found.title = (
+            f"{kept[key].get('name')} on {found.dataset}: {len(sequences)} sequence{plural} ({shown}), {scans} scans"
+        )
+        differs = [f"{name}={kept[key].get(name)}" for name in told if name not in ("name", "experiment")]
+        if differs:
+            found.title += f" [{'; '.join(differs[:4])}{'; ...' if len(differs) > 4 else ''}]"
+
+
+def folders(found: Mapping[int, Scored]) -> list[Path]:
+    """Whence a row's figures are."""
+    return [found[seed].folder for seed in sorted(found)]

@@ -1,0 +1,159 @@
+"""Plots of a group of runs: PQ by strategy, against distance and points, and membership accuracy.
+
+Axes and texts have one ink that no page has; on the page it becomes the text's colour, in light as in dark.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from itertools import pairwise
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from most.reports.ablations import Ablation
+from most.reports.analysis import Analysis
+from most.reports.bootstrap import Interval
+
+INK = "#010203"
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#7a5195")  # Okabe and Ito's, readable
+MARKS = ("o", "s", "^", "D", "v", "P", "X")
+STYLE: Any = {
+    "svg.fonttype": "none", "font.family": "sans-serif", "font.size": 10, "axes.spines.top": False,
+    "axes.spines.right": False, "text.color": INK, "axes.labelcolor": INK, "axes.edgecolor": INK,
+    "xtick.color": INK, "ytick.color": INK, "axes.facecolor": "none", "figure.facecolor": "none",
+    "legend.frameon": False,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A picture, and its meaning in words."""
+
+    name: str
+    title: str
+    meaning: str
+    svg: str
+
+
+def plots(ablations: Mapping[str, Ablation], analysis: Analysis) -> list[Plot]:
+    """All plots that there are runs for."""
+    strategies, ways = ablations["table1"], ablations["table2"]
+    measured = analysis.group.measured
+    found = [
+        _bars("extents", "PQ by extent strategy", strategies, analysis, {"PQ": "pq"}),
+        _curves("distance", "PQ of things against distance", strategies, analysis, measured.distance_edges, "m"),
+        _curves("points", "PQ of things against points per instance", strategies, analysis, measured.points_edges, ""),
+        _bars("membership", "Membership accuracy", ways, analysis,
+              {"all": "membership_accuracy", "contested": "membership_accuracy_contested"}),
+    ]  # fmt: skip
+    return [each for each in found if each is not None]
+
+
+def _bars(name: str, title: str, ablation: Ablation, analysis: Analysis, keys: dict[str, str]) -> Plot | None:
+    """A line for each row: mean and interval, and each seed as a dot."""
+    rows = {ablation.title_of(each): ablation.runs(analysis.group, each) for each in ablation.rows.values()}
+    found = {row: analysis.cells(runs, keys) for row, runs in rows.items()}
+    if not any(cell for cells in found.values() for cell in cells.values()):
+        return None
+    with mpl.rc_context(STYLE):
+        figure, axes = _figure(0.45 * len(rows) * len(keys) + 1)
+        for series, (label, key) in enumerate(keys.items()):
+            for place, (row, runs) in enumerate(rows.items()):
+                at = place + 0.25 * (series - (len(keys) - 1) / 2)
+                _bar(
+                    axes,
+                    at,
+                    found[row][label],
+                    analysis.by_seed(runs, key).values(),
+                    series,
+                    label if not place else None,
+                )
+        axes.set_yticks(range(len(rows)), list(rows))
+        axes.invert_yaxis()
+        axes.set_xlabel("%")
+        axes.grid(axis="x", alpha=0.2, color=INK)
+        if len(keys) > 1:
+            axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=len(keys))
+        said = "; ".join(f"{row} {_said(cells)}" for row, cells in found.items())
+        return Plot(name, title, f"{title}, with 95 % intervals; small dots are seeds. {said}.", _svg(figure, name))
+
+
+def _bar(axes: Axes, at: float, cell: Interval | None, seeds: Iterable[float], series: int, label: str | None) -> None:
+    if cell is None:
+        return
+    values = [100 * value for value in seeds]
+    axes.plot(values, [at] * len(values), ".", color=COLOURS[series], alpha=0.5, markersize=4)
+    low, high = (cell.value if bound is None else bound for bound in (cell.low, cell.high))
+    axes.hlines(at, 100 * low, 100 * high, color=COLOURS[series], linewidth=2)
+    axes.plot([100 * cell.value], [at], MARKS[series], color=COLOURS[series], label=label, markersize=7)
+
+
+def _curves(
+    name: str, title: str, ablation: Ablation, analysis: Analysis, edges: Sequence[float], unit: str
+) -> Plot | None:
+    """A curve for each row, a point for each bin, with the interval as a band."""
+    bins = {str(index): f"{name}/{index}" for index in range(len(edges))}
+    found = {}
+    for each in ablation.rows.values():
+        cells = analysis.cells(ablation.runs(analysis.group, each), bins)
+        if all(cells.values()):
+            found[ablation.title_of(each)] = [cell for cell in cells.values() if cell is not None]
+    if not found:
+        return None
+    labels = _bin_names(edges, unit)
+    with mpl.rc_context(STYLE):
+        figure, axes = _figure(3.6)
+        for series, (row, curve) in enumerate(found.items()):
+            _curve(axes, row, curve, series)
+        axes.set_xticks(range(len(labels)), labels)
+        axes.set_xlabel("distance of the modal centre" if unit else "points of the instance")
+        axes.set_ylabel("PQ, %")
+        axes.set_ylim(0, 100)
+        axes.grid(axis="y", alpha=0.2, color=INK)
+        axes.legend(loc="upper left", bbox_to_anchor=(1, 1))
+        meaning = f"{title}: all things together, in bins; bands are 95 % intervals. {_official(name)}"
+        return Plot(name, title, meaning, _svg(figure, name))
+
+
+def _official(name: str) -> str:
+    if name == "distance":
+        return "Segments count as officially."
+    return "Those too small for the official figure count here, too."
+
+
+def _curve(axes: Axes, row: str, cells: Sequence[Interval], series: int) -> None:
+    colour, mark = COLOURS[series % len(COLOURS)], MARKS[series % len(MARKS)]
+    low, high = (
+        [100 * (cell.value if bound is None else bound) for cell, bound in zip(cells, bounds, strict=True)]
+        for bounds in ([cell.low for cell in cells], [cell.high for cell in cells])
+    )
+    axes.fill_between(range(len(cells)), low, high, color=colour, alpha=0.15, linewidth=0)
+    axes.plot([100 * cell.value for cell in cells], mark + "-", color=colour, label=row, markersize=5)
+
+
+def _bin_names(edges: Sequence[float], unit: str) -> list[str]:
+    """``0 to 10 m`` for a distance, ``1 to 14`` for a number of points, and an open end."""
+    unit, step = (f" {unit}", 0) if unit else ("", 1)
+    ends = [f"{low:g} to {high - step:g}{unit}" for low, high in pairwise(edges)]
+    return [*ends, f"{edges[-1]:g}{unit} on"]
+
+
+def _said(cells: Mapping[str, Interval | None]) -> str:
+    return ", ".join(f"{100 * cell.value:.1f}" for cell in cells.values() if cell is not None)
+
+
+def _figure(height: float) -> tuple[Figure, Axes]:
+    figure = Figure(figsize=(8, height), layout="constrained")
+    return figure, figure.add_subplot()
+
+
+def _svg(figure: Figure, name: str) -> str:
+    """The picture, the same every time; ids begin with its name, so that a page can hold several."""
+    buffer = BytesIO()
+    with mpl.rc_context({"svg.hashsalt": name, **STYLE}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    text = buffer.getvalue().decode()
+    return text[text.index("<svg") :]

@@ -1,0 +1,120 @@
+"""Finds training runs in a folder, at any depth, and reads what each was and what it reached.
+
+A run is a folder with ``.hydra/`` (``config.yaml``, ``overrides.yaml``, ``hydra.yaml``), as Hydra leaves them, and,
+once it is finished, ``metrics.json``. What ``most.evaluate`` said of its predictions may lie in ``evaluated/NAME.json``
+beside it, where NAME is the membership that predicted (``full``, ``nearest``, ``clustering``, ...).
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from most.errors import DataError
+from most.metrics.report import read_report
+from most.reports.strategy import Strategy, strategy_of
+from most.reports.sums import Sums, read_sums
+
+FILES = ("config.yaml", "hydra.yaml", "overrides.yaml")
+EVALUATED, VALIDATED, BESIDE = "evaluated", "validated", "beside"
+
+
+@dataclass
+class Scored:
+    """One run scored in one way."""
+
+    folder: Path
+    source: str  # EVALUATED by most.evaluate; VALIDATED at the end of training; BESIDE: nearest centres, at that end
+    seed: int
+    strategy: Strategy
+    config: Mapping[str, Any]
+    choices: Mapping[str, Any]
+    report: Mapping[str, Any]  # what most.evaluate or the training wrote
+    sums: Sums
+
+
+@dataclass
+class Runs:
+    """What a folder holds."""
+
+    scored: list[Scored]
+    left_out: dict[Path, str]  # runs that cannot be counted, and why
+
+
+def find_runs(folder: Path) -> Runs:
+    """Read all runs in a folder; raises DataError where there is none, and for files that are damaged."""
+    if not folder.is_dir():
+        raise DataError(f"runs: expected a folder of runs of most.train, found no folder {folder}; check runs=...")
+    runs = Runs([], {})
+    for path in sorted(folder.rglob(".hydra")):
+        if path.is_dir() and "stage" in (config := _yaml(path / "config.yaml", dict)):
+            _read(path.parent, config, runs)
+    if not runs.scored and not runs.left_out:
+        raise DataError(
+            f"{folder}: expected runs of most.train (folders with .hydra and metrics.json), found none; check runs=..."
+        )
+    return runs
+
+
+def _read(folder: Path, config: Mapping[str, Any], runs: Runs) -> None:
+    """Add what a run was scored by, or why it cannot be."""
+    hydra, overrides = (
+        _yaml(folder / ".hydra" / name, kind) for name, kind in zip(FILES[1:], (dict, list), strict=True)
+    )
+    choices = hydra.get("hydra", {}).get("runtime", {}).get("choices")
+    if not isinstance(choices, dict) or not {"extent", "membership", "dataset"} <= choices.keys():
+        raise DataError(f"{folder / '.hydra/hydra.yaml'}: expected hydra.runtime.choices of most.train, found none")
+    try:
+        strategy = strategy_of(config, choices, overrides)
+        seed = int(config["seed"])
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise DataError(
+            f"{folder / '.hydra/config.yaml'}: expected a configuration of most.train, found none ({error!r})"
+        ) from error
+    found = 0
+    for report, path, membership, section, source in _reports(folder, config, strategy.membership):
+        if (sums := report[section].get("sums")) is None:
+            runs.left_out[path] = "has no sums of sequences: written by an earlier version"
+            continue
+        way = replace(strategy, membership=membership)
+        runs.scored.append(Scored(folder, source, seed, way, config, choices, report, read_sums(sums, f"{path}")))
+        found += 1
+    if not found and not any(folder in path.parents for path in runs.left_out):
+        runs.left_out[folder] = _unfinished(folder, config)
+
+
+def _reports(
+    folder: Path, config: Mapping[str, Any], membership: str
+) -> Iterator[tuple[Mapping[str, Any], Path, str, str, str]]:
+    """Yield reports with their place, the membership scored, its section, and whence they are."""
+    for path in sorted((folder / "evaluated").glob("*.json")):
+        name = membership if membership.split(" ")[0] == path.stem else path.stem
+        yield read_report(path), path, name, "panoptic", EVALUATED
+    path = folder / "metrics.json"
+    if not path.is_file():
+        return
+    report = read_report(path)
+    if "membership" not in config["stage"]["run"]:
+        yield report, path, membership, "panoptic", VALIDATED
+    elif isinstance(report.get("panoptic_nearest"), dict):  # else stage 1 wrote it, and stage 2 is not finished
+        yield report, path, membership, "panoptic", VALIDATED
+        yield report, path, "nearest", "panoptic_nearest", BESIDE
+
+
+def _unfinished(folder: Path, config: Mapping[str, Any]) -> str:
+    if (folder / "metrics.json").is_file():
+        return "unfinished: stage 2 has not ended"
+    kept = sorted((folder / "checkpoints").glob("*-last.ckpt"))
+    return f"unfinished: goes on with resume={kept[-1]}" if kept else "unfinished: no metrics.json"
+
+
+def _yaml(path: Path, kind: type) -> Any:
+    try:
+        content = yaml.safe_load(path.read_text())
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise DataError(f"{path}: expected what Hydra wrote of a run, found none readable ({error})") from error
+    if not isinstance(content, kind):
+        raise DataError(f"{path}: expected a YAML {kind.__name__}, found {type(content).__name__}")
+    return content

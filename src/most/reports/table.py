@@ -1,0 +1,63 @@
+"""A table's content, whoever lays it out: blocks of rows, each cell a figure with its interval, as fractions."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from most.reports.bootstrap import Interval
+
+Cells = dict[str, Interval | None]  # by column; None is what is not known
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row."""
+
+    title: str
+    cells: Cells
+    seeds: tuple[int, ...] = ()  # of ours
+
+
+@dataclass(frozen=True)
+class Block:
+    """Rows of one origin: measured here, or the paper's."""
+
+    title: str
+    rows: tuple[Row, ...]
+    ours: bool
+
+
+@dataclass(frozen=True)
+class Table:
+    """``name`` is that of its files."""
+
+    name: str
+    title: str
+    columns: tuple[str, ...]
+    blocks: tuple[Block, ...]
+    notes: tuple[str, ...] = ()
+    signed: bool = False  # differences, which show + and -
+    words: dict[str, str] = field(default_factory=dict)  # by row: what is said behind its figures
+
+    def rows(self) -> Iterator[tuple[Block, Row]]:
+        """All rows with their blocks."""
+        return ((block, row) for block in self.blocks for row in block.rows)
+
+
+def percent(cell: Interval | None, signed: bool = False) -> str:
+    """A figure in percent, without its interval."""
+    if cell is None:
+        return "-"
+    return f"{100 * cell.value:{'+' if signed else ''}.1f}"
+
+
+def between(cell: Interval | None, signed: bool = False) -> str:
+    """An interval in percent, empty where there is none."""
+    if cell is None or cell.low is None or cell.high is None:
+        return ""
+    sign = "+" if signed else ""
+    return f"{100 * cell.low:{sign}.1f} to {100 * cell.high:{sign}.1f}"
+
+
+def numbers(seeds: Sequence[int]) -> str:
+    """Seeds in words."""
+    return f"seed{'s' if len(seeds) > 1 else ''} {', '.join(map(str, seeds))}" if seeds else ""

@@ -1,0 +1,177 @@
+"""The paper's tables: its rows and columns, ours and its figures apart, differences by hand, and their files."""
+
+import csv
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+
+from example_runs import example_run, example_sums, example_sweep
+from most.errors import ConfigError
+from most.metrics.paper_tables import SEGMENTATION, TRACKING
+from most.reports import paper
+from most.reports.ablations import AMODALIZATION, amodalization, memberships
+from most.reports.analysis import Analysis
+from most.reports.formats import latex, markdown
+from most.reports.groups import group
+from most.reports.orders import order_table, verdict
+from most.reports.runs import find_runs
+from most.reports.table import Table
+from most.reports.tables import ablation_table, benchmark_tables, difference_table
+from most.reports.write import write_reports
+
+
+@pytest.fixture(scope="module")
+def analysis(tmp_path_factory: pytest.TempPathFactory) -> Analysis:
+    folder = example_sweep(tmp_path_factory.mktemp("sweep"), seeds=2)
+    (found,) = group(find_runs(folder).scored)
+    return Analysis(found, draws=200, seed=1)
+
+
+def ours(table: Table) -> dict[str, dict[str, float]]:
+    return {
+        row.title: {key: cell.value for key, cell in row.cells.items() if cell}
+        for block, row in table.rows()
+        if block.ours
+    }
+
+
+def test_table_1_has_the_papers_rows_in_its_order(analysis: Analysis) -> None:
+    table = ablation_table(amodalization(analysis.group), analysis)
+    papers = [row.title for block, row in table.rows() if not block.ours]
+    assert [title for title in papers if title in ours(table)] == list(ours(table))
+    assert len(ours(table)) == 5
+    assert table.columns[:6] == ("PQ", "PQ Th", "PQ St", "mIoU", "mIoU Th", "mIoU St")
+    figures = next(row for block, row in table.rows() if not block.ours and row.title == "Modal Det. (MAX)")
+    assert figures.cells["PQ"].value == pytest.approx(0.771)
+    assert "(full)" in table.notes[0]
+
+
+def test_table_2_compares_with_the_nearest_centre_of_the_same_stage_1(analysis: Analysis) -> None:
+    table = ablation_table(memberships(analysis.group), analysis)
+    assert list(ours(table)) == [
+        "Nearest neighbour (baseline)", "PointSegMLP (semantic + geometric)", "+ BEV feat.", "+ Point feat. (full)",
+    ]  # fmt: skip
+    nearest = ours(table)["Nearest neighbour (baseline)"]["Membership Acc"]
+    assert nearest == pytest.approx(0.7, abs=0.05)
+    assert "MAX" in table.notes[0]
+
+
+def test_differences_are_to_the_row_that_was_chosen(analysis: Analysis) -> None:
+    ablation = amodalization(analysis.group)
+    whole = ours(ablation_table(ablation, analysis))
+    for baseline, title in ((None, "Modal Det. (SW), w/ sharing"), ("amodal", "Amodal Det.")):
+        table = difference_table(ablation, analysis, baseline)
+        assert table.title.endswith(title)
+        assert title not in ours(table)
+        expected = whole["Modal Det. (MAX)"]["PQ"] - whole[title]["PQ"]
+        assert ours(table)["Modal Det. (MAX)"]["PQ"] == pytest.approx(expected)
+
+
+def test_a_single_row_has_no_differences_and_one_run_no_interval(tmp_path: Path) -> None:
+    example_run(tmp_path, example_sums(0.7, 1, sequences=("09",)))
+    (found,) = group(find_runs(tmp_path).scored)
+    single = Analysis(found, draws=200, seed=1)
+    assert difference_table(amodalization(found), single, None) is None
+    assert order_table({"table1": amodalization(found), "table2": memberships(found)}, single) is None
+    (row,) = (row for block, row in ablation_table(amodalization(found), single).rows() if block.ours)
+    assert row.cells["PQ"].low is None
+
+
+def test_runs_without_a_seed_in_common_have_no_difference(tmp_path: Path) -> None:
+    for seed, extent in ((1, "shrink_wrap"), (2, "track_max")):
+        example_run(tmp_path / extent, example_sums(0.7, seed), seed=seed, extent=extent)
+    (found,) = group(find_runs(tmp_path).scored)
+    table = difference_table(amodalization(found), Analysis(found, 200, 1), None)
+    assert ours(table) == {"Modal Det. (MAX)": {}}
+
+
+def test_orders_are_said_with_their_confidence(analysis: Analysis) -> None:
+    parts = {"table1": amodalization(analysis.group), "table2": memberships(analysis.group)}
+    table = order_table(parts, analysis)
+    assert table.words["track_max above shrink_wrap"] == "shows (in 100.0 % of draws)"
+    papers = {row.title: row.cells["PQ"].value for block, row in table.rows() if not block.ours}
+    assert papers["track_max above shrink_wrap"] == pytest.approx(0.033)
+    assert papers["full above nearest"] == pytest.approx(0.029)
+    interval = analysis.differences(
+        *(analysis.group.by_seed(each) for each in analysis.group.strategies[:2]), {"": "pq"}
+    )
+    assert verdict(interval[""])
+    assert verdict(None) == "no seed in common"
+
+
+def test_benchmarks_have_the_papers_columns(analysis: Analysis) -> None:
+    table4, classes = benchmark_tables(analysis)
+    assert (table4.name, table4.columns) == ("table4", tuple(SEGMENTATION))
+    assert classes.columns[:3] == ("car", "truck", "bicycle")
+    row = next(row for block, row in classes.rows() if block.ours)
+    assert row.cells["truck"] is None  # no sequence has one
+    assert row.cells["car"].value > 0.3
+
+
+def test_table_5_is_of_tracked_predictions(tmp_path: Path) -> None:
+    example_run(tmp_path, example_sums(0.7, 1, tracked=True))
+    (found,) = group(find_runs(tmp_path).scored)
+    table = next(table for table in benchmark_tables(Analysis(found, 200, 1)) if table.name == "table5")
+    assert table.columns == (*TRACKING, "PQ")
+    row = next(row for block, row in table.rows() if block.ours)
+    assert row.cells["LSTQ"].low < row.cells["LSTQ"].value < row.cells["LSTQ"].high
+    assert row.cells["PAT"] is None
+    assert next(row for block, row in table.rows() if row.title == "MOST").cells["LSTQ"].value == pytest.approx(0.603)
+
+
+def test_the_papers_tables_are_as_wide_as_their_columns_and_means_follow_from_classes() -> None:
+    content = yaml.safe_load((Path(paper.__file__).parent / "paper.yaml").read_text())
+    for name, table in content.items():
+        for row, values in table["rows"].items():
+            assert len(values) == len(table["columns"]), (name, row)
+            assert all(value is None or 0 < value < 100 for value in values), (name, row)
+    assert content["table1"]["columns"] == list(AMODALIZATION)[:6]
+    for name, things in (("classes_nuscenes", 10), ("classes_semantickitti", 8)):
+        *classes, of_things, of_stuff, of_all = content[name]["rows"]["MOST"]  # of others the paper rounds otherwise
+        assert sum(classes[:things]) / things == pytest.approx(of_things, abs=0.06), name
+        assert sum(classes[things:]) / len(classes[things:]) == pytest.approx(of_stuff, abs=0.11), name
+        assert sum(classes) / len(classes) == pytest.approx(of_all, abs=0.06), name
+
+
+def test_every_layout_tells_ours_from_the_papers(tmp_path: Path) -> None:
+    out = tmp_path / "report"
+    write_reports(example_sweep(tmp_path / "runs", seeds=2), out, "drop_small", draws=200, seed=1)
+    with (out / "tables/table1.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert {row["from"] for row in rows} == {"ours", "paper"}
+    of_max = {row["from"]: row for row in rows if row["row"] == "Modal Det. (MAX)"}
+    assert float(of_max["paper"]["PQ"]) == pytest.approx(0.771)
+    assert of_max["paper"]["PQ low"] == ""
+    assert float(of_max["ours"]["PQ low"]) < float(of_max["ours"]["PQ"]) < float(of_max["ours"]["PQ high"])
+    assert of_max["ours"]["seeds"] == "1 2"
+    text = (out / "report.md").read_text()
+    assert text.index("**Measured here") < text.index("**The paper's own figures")
+    assert "differences to Modal Det. (DSB)" in text
+    assert f"{100 * float(of_max['ours']['PQ']):.1f} (" in text
+    assert sorted(path.stem for path in (out / "plots").iterdir()) == ["distance", "extents", "membership", "points"]
+    tex = (out / "report.tex").read_text()
+    assert tex.count(r"\begin{tabular}") == tex.count(r"\end{tabular}") == 7
+    assert not re.search(r"(?<!\\)[_&%#](?![^\n]*\\\\)", re.sub(r"\\label\{.*?\}|^%.*$", "", tex, flags=re.M))
+
+
+def test_the_same_runs_give_the_same_files(tmp_path: Path) -> None:
+    runs = example_sweep(tmp_path / "runs", seeds=1)
+    for name in ("one", "two"):
+        write_reports(runs, tmp_path / name, None, draws=100, seed=3)
+    for path in (tmp_path / "one").rglob("*.*"):
+        assert path.read_bytes() == (tmp_path / "two" / path.relative_to(tmp_path / "one")).read_bytes(), path
+
+
+def test_a_baseline_that_is_no_row_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    runs = example_run(tmp_path / "runs", example_sums(0.7, 1))
+    with pytest.raises(ConfigError, match="baseline: expected one of track_max, nearest, found trackmax"):
+        write_reports(runs, tmp_path / "out", "trackmax", draws=100, seed=1)
+    assert not (tmp_path / "out").exists()
+
+
+def test_letters_that_layouts_need_themselves_are_escaped(analysis: Analysis) -> None:
+    table = Table("t", "50 % & a_b", ("c|d",), (), ("x < y",))
+    assert r"50 \% \& a\_b" in latex(table)
+    assert r"c\|d" in markdown(table)
