@@ -57,16 +57,17 @@ def tensors(prediction):
 def test_a_loaded_model_predicts_bit_for_bit_what_the_saved_one_did(tmp_path, changes):
     predictor = tiny_predictor(**changes)
     predictor.network(SAMPLES)  # moves the batch statistics from where they start
-    if "centre_head" not in changes:
+    if hasattr(predictor.network.centre_head, "heatmap"):
         predictor.network.centre_head.heatmap.bias.data += 2.0  # for some detections
     for part in predictor.modules().values():
         part.eval()
     trained = load_trained(save(tmp_path, checkpoint(predictor, **changes)))
     assert (trained.sweeps, trained.taxonomy) == (1, TAXONOMY)
     assert not trained.predictor.network.training
-    for before, after in zip(predictor(SAMPLES), trained.predictor(SAMPLES), strict=True):
-        assert len(before.detections) > 0
-        assert all(torch.equal(*pair) for pair in zip(tensors(before), tensors(after), strict=True))
+    before, after = predictor(SAMPLES), trained.predictor(SAMPLES)
+    assert any(len(one.detections) > 0 for one in before)
+    for one, other in zip(before, after, strict=True):
+        assert all(torch.equal(*pair) for pair in zip(tensors(one), tensors(other), strict=True))
 
 
 DRAWN = {"kind": "gaussian_radius", "min_variance": 1.0, "min_overlap": 0.2, "min_radius": 3, "min_points": 5}
