@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from most.assembly import FORMAT, describe, describe_run, model_parts, stage1_parts
+from most.assembly import FORMAT, describe, describe_run, model_parts, stage1_parts, training_of
 from most.backbones import AsymmetricUNetSmallSettings
 from most.checks import check_resume, check_stage1, stages_to_run
 from most.config import Config, Heads, OffsetHeads, to_plain
@@ -22,7 +22,6 @@ from most.stages.detection import DetectionTraining
 from most.stages.membership import MembershipTraining
 from most.stages.settings import StageSettings
 from most.stages.trainer import TrainerSettings
-from most.training import detection_training
 from semantickitti_tree import write_sequence
 from tiny import TAXONOMY, tiny_parts
 
@@ -90,9 +89,11 @@ def test_amodal_extents_are_refused_without_boxes_and_have_a_head_of_their_own(c
 
 
 def test_extents_of_points_too_few_are_no_targets(config):
-    assert detection_training(config) is config.stage.detection
+    assert training_of(config, "detection") is config.stage.detection
     config.extent = DropSmall(min_points=3)
-    assert detection_training(config).targets.min_points == 3
+    assert training_of(config, "detection").targets.min_points == 3
+    assert training_of(config, "membership") is config.stage.membership
+    assert describe_run(config, "detection", FRAMES)["training"]["targets"]["min_points"] == 3
     assert config.stage.detection.targets.min_points == 1
 
 

@@ -91,6 +91,7 @@ def test_jobs_that_can_run_pass(make):
     [
         ("seed=-1", r"job seed=-1: seed: expected a number in"),
         ("dataset.root=nowhere", r"job default: nowhere/sequences: expected"),
+        ("trainer.devices=2", r"job trainer.devices=2: trainer.devices: expected one process for each job"),
         ("stage=membership", r"job stage=membership: stage1: expected a checkpoint of stage 1, found none"),
         ("logger=none", r"default: expected jobs that differ in what they train, found two of this name"),
     ],
@@ -135,6 +136,16 @@ def test_a_folder_of_other_settings_is_refused_whether_finished_or_not(make, oth
     (job.folder / "metrics.json").unlink()
     leave(job, "checkpoints/detection-last.ckpt", settings=make("seed=1", other))
     with pytest.raises(ConfigError, match=expected):
+        check_jobs([job])
+
+
+@pytest.mark.parametrize("text", ["", "a: [", "- a", "hydra: 1"])
+def test_settings_that_were_cut_off_in_writing_are_named(make, text):
+    job = make("seed=1")
+    leave(job, "metrics.json")
+    for name in ("config.yaml", "hydra.yaml"):
+        (job.folder / ".hydra" / name).write_text(text)
+    with pytest.raises(DataError, match=r"job seed=1: .*/\.hydra: expected the settings that the job began with"):
         check_jobs([job])
 
 

@@ -32,7 +32,8 @@ def read_run(folder: Path) -> OfflineRun:
     for record in _records(binary):
         content = record[record["type"]]
         if record["type"] == "run" and "config" in content:
-            run.name, run.group, run.config = content["display_name"], content["run_group"], content["config"]["update"]
+            run.name, run.group = content["display_name"], content.get("run_group", "")
+            run.config = content["config"]["update"]
         if record["type"] == "history":
             run.last |= content["item"]
         if record["type"] == "artifact":

@@ -14,12 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+from yaml import YAMLError
 
 from most.checks import flat, stages_to_run
 from most.config import Config, typed
 from most.datasets.reader import Reader
 from most.entry import end
-from most.errors import ConfigError, FailedError, MostError, StoppedError
+from most.errors import ConfigError, DataError, FailedError, MostError, StoppedError
 from most.stages.settings import STAGES
 from most.training import METRICS, checkpoint_path
 
@@ -96,6 +98,11 @@ def _check(job: Job, readers: dict[str, Reader]) -> None:
     if job.finished:
         return
     config: Config = typed(job.settings())
+    if config.trainer.processes() > 1:
+        raise ConfigError(
+            f"trainer.devices: expected one process for each job of a sweep, found {config.trainer.processes()}; "
+            "say trainer=gpu, or train the combinations without -m"
+        )
     config.resume = config.resume or standing(job.folder)
     key = repr(config.dataset)
     if key not in readers:
@@ -108,8 +115,7 @@ def _check_beginning(job: Job) -> None:
     written = job.folder / ".hydra"
     if not (job.finished or standing(job.folder)) or not (written / "config.yaml").is_file():
         return
-    began = flat(_plain(OmegaConf.load(written / "config.yaml")))
-    began |= chosen(OmegaConf.load(written / "hydra.yaml").hydra.runtime.choices)
+    began = _written(written)
     now = flat(_plain(job.settings())) | chosen(job.composed.hydra.runtime.choices)
     for key in began.keys() & now.keys():
         if began[key] != now[key] and not _is_of(key, NO_FIGURE):
@@ -117,6 +123,18 @@ def _check_beginning(job: Job) -> None:
                 f"{job.folder} began with {key} = {began[key]}, found {now[key]}; "
                 "repeat the settings it began with, or choose another hydra.sweep.dir"
             )
+
+
+def _written(folder: Path) -> dict[str, Any]:
+    """Read the settings, by dotted keys, and the choices that Hydra wrote down of a run."""
+    try:
+        settings, hydra = (OmegaConf.load(folder / name) for name in ("config.yaml", "hydra.yaml"))
+        return flat(_plain(settings)) | chosen(hydra.hydra.runtime.choices)
+    except (OSError, OmegaConfBaseException, YAMLError, ValueError, TypeError, AttributeError) as error:
+        raise DataError(
+            f"{folder}: expected the settings that the job began with, found none readable ({error}); "
+            "remove that folder where you know that they were the same, else the job's"
+        ) from error
 
 
 def standing(folder: Path) -> str | None:
@@ -187,5 +205,6 @@ def _is_of(key: str, groups: Sequence[str]) -> bool:
 
 def _plain(config: Any) -> dict[str, Any]:
     plain = OmegaConf.to_container(config)  # environment variables as they were written
-    assert isinstance(plain, dict)
+    if not isinstance(plain, dict):
+        raise TypeError(f"no mapping but {type(plain).__name__}")
     return {str(key): value for key, value in plain.items()}

@@ -11,6 +11,7 @@ import nuscenes_tree
 from commands import SPLITS, TINY, Done, Signal, most
 from most.sweeps import by_key, job_name
 from semantickitti_tree import write_sequence
+from wandb_run import read_run
 
 SETTINGS = ["+experiment=sim_demo", "dataset.root=tree", "dataset.tables=tables", *SPLITS, *TINY, "logger=none",
             "logger.pictures=0", "trainer.progress_bar=false", "stage.detection.epochs=1"]  # fmt: skip
@@ -93,10 +94,15 @@ def test_memberships_share_one_stage_1_that_a_runs_folder_names(continued):
     """Each seed's own, by processes that submitit starts."""
     pytest.importorskip("hydra_plugins.hydra_submitit_launcher")
     (continued / "stage1_1").symlink_to(jobs(continued)[NAMES[2]])
-    done = most(continued, "train", "-m", *SETTINGS, "hydra.sweep.dir=stage2", "stage=membership", "seed=1",
+    settings = [setting for setting in SETTINGS if setting != "logger=none"]
+    done = most(continued, "train", "-m", *settings, "hydra.sweep.dir=stage2", "stage=membership", "seed=1",
                 "extent=track_max", "membership=geometric,full", "stage1=stage1_${seed}",
                 "hydra/launcher=submitit_local")  # fmt: skip
     assert done.returncode == 0, done.stderr
+    runs = {path.name: read_run(path) for path in (continued / "stage2").glob("extent=*")}
+    assert {(run.group, run.name) for run in runs.values()} == {("stage2", name) for name in runs}
+    told = [(run.config["choices"]["membership"], run.config["overrides"]["membership"]) for run in runs.values()]
+    assert sorted(told) == [("full", "full"), ("geometric", "geometric")]
     made = sorted((continued / "stage2").glob("extent=*/checkpoints/*"))
     assert [path.name for path in made] == ["membership-last.ckpt"] * 2
     networks = [torch.load(path, weights_only=True)["state_dict"] for path in made]
@@ -110,11 +116,11 @@ def test_memberships_share_one_stage_1_that_a_runs_folder_names(continued):
     [
         ("extent=trackmax,track_max", ["extent/trackmax", "shrink_wrap", "track_max"]),
         ("stage.detection.max_rate=1,2", ["max_rate", "expected one of batch_size, ", "max_lr"]),
-        ("stage.detection.epochs=1,0", ["epochs=0", "stage.detection.epochs: expected a positive number, found 0"]),
+        ("stage.detection.epochs=1,0", ["job ", "stage.detection.epochs: expected a positive number, found 0"]),
         ("stage=membership stage1={stage1} backbone=asymmetric_unet_small,residual_unet",
          ["backbone=residual_unet", "was trained with another backbone", "'component': 'asymmetric_unet_small'"]),
-        ("stage=membership stage1={stage1} seed=1,2 dataset=nuscenes dataset.root=nuscenes ~dataset.splits",
-         ["was trained with another taxonomy: expected", "'name': 'nuscenes'", "found {{'name': 'semantickitti'"]),
+        ("stage=membership stage1={stage1} seed=1,2 dataset=nuscenes dataset.root=nuscenes",
+         ["was trained with another taxonomy: expected", "'name': 'nuscenes'", "found {'name': 'semantickitti'"]),
     ],
 )  # fmt: skip
 def test_what_one_job_cannot_do_refuses_the_sweep_before_any_starts(killed, arguments, words):
@@ -122,9 +128,9 @@ def test_what_one_job_cannot_do_refuses_the_sweep_before_any_starts(killed, argu
     if "nuscenes" in arguments and not (killed / "nuscenes").exists():
         nuscenes_tree.write_tree(killed / "nuscenes", {"scene-0001": True, "scene-0003": True})
     settings = [setting for setting in SETTINGS if "nuscenes" not in arguments or setting not in SPLITS]
-    told = arguments.format(stage1=f"'{stage1}'").replace(" ~dataset.splits", "").split()
+    told = arguments.format(stage1=f"'{stage1}'").split()
     done = most(killed, "train", "-m", *settings, "hydra.sweep.dir=refused", *told)
     assert done.returncode == 2, done.stderr
     assert "Traceback" not in done.stderr
-    assert all(word.replace("{{", "{") in done.stderr for word in words), done.stderr
+    assert all(word in done.stderr for word in words), done.stderr
     assert not (killed / "refused").exists()
