@@ -49,7 +49,7 @@ def test_a_long_vehicle_of_two_patches_is_one_where_its_class_is_wide():
 
 def test_what_is_longer_than_its_box_is_cut_at_its_widest_gap():
     first, second = rectangle((0, 0), 4, 2), rectangle((4.5, 0), 4, 2)  # bumpers half a metre apart
-    assert label(first, second) == [{0}, {1}]
+    assert label(first, second) in ([{0}, {1}], [{1}, {0}])
     assert label(first, second, margin=2.2) == [{0}, {0}]
 
 

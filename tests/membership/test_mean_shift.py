@@ -37,6 +37,11 @@ def test_centres_within_a_bandwidth_are_one_cluster():
     assert set(mean_shift(blobs((0, 0, 0), (0.6, 0, 0)), 1.2).tolist()) == {0}
 
 
+def test_of_two_modes_within_a_bandwidth_one_stays():
+    """Ascents end at 0.55 and at 1.6, each the mean of two votes: 1.05 m apart."""
+    assert mean_shift(np.array([[0.05, 0.05, 0.05], [1.05, 0.05, 0.05], [2.15, 0.05, 0.05]]), 1.2).tolist() == [0, 0, 0]
+
+
 def test_height_tells_apart_too():
     assert len(set(mean_shift(blobs((0, 0, 0), (0, 0, 2.5)), 1.2).tolist())) == 2
 

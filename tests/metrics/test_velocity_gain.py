@@ -81,6 +81,8 @@ def test_errors_are_those_of_moving_objects_that_were_detected() -> None:
     assert errors.summary() == {"objects": 1, "predicted": 5.0, "zero": 10.0}
     nobody = velocity_errors(detections((0.0, 6.0, 8.0), thing=2), torch.ones(1, 3), cars)
     assert len(nobody) == 0
+    unknown = detections((0.2, float("nan"), float("nan")), (30.0, 9.0, 1.0))
+    assert velocity_errors(unknown, torch.ones(2, 3), cars).errors.tolist() == [1.0]
     both = VelocityErrors.cat([errors, velocity_errors(detections((30.0, 9.0, 1.0)), torch.ones(1, 3), cars)])
     assert both.summary() == pytest.approx({"objects": 2, "predicted": 3.0, "zero": 9.5})
 

@@ -20,7 +20,7 @@ class CentreHead:
     channels: int = 64
     heatmap_bias: float = -2.19  # sigmoid(-2.19) = 0.1: few cells hold a centre
 
-    gives = "centres"
+    gives = "centres"  # what memberships may need
 
     def __post_init__(self) -> None:
         if self.channels < 1:

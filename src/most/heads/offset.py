@@ -15,7 +15,7 @@ class OffsetHead:
 
     channels: int = 32
 
-    gives = "offsets"
+    gives = "offsets"  # what memberships may need
 
     def __post_init__(self) -> None:
         if self.channels < 1:

@@ -25,7 +25,7 @@ class Clustering:
     link: float = 1.0  # of the box's width
     margin: float = 1.3  # of the box
 
-    needs = None
+    needs = None  # of what heads give
 
     def __post_init__(self) -> None:
         if not self.link > 0:

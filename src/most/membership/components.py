@@ -3,7 +3,7 @@
 import itertools
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Bool, Float64, Int64
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, Delaunay
@@ -45,23 +45,33 @@ def linked(places: Ground, radius: float) -> Int64[np.ndarray, "points"]:
     return connected_components(links, directed=False)[1].astype(np.int64)
 
 
-def cut(middles: Ground, piece: Int64[np.ndarray, "cells"], box: Box, margin: float) -> list[np.ndarray]:
-    """Return the parts of a piece (rows of ``middles``) that are small enough.
+def cut(middles: Ground, whole: Int64[np.ndarray, "cells"], box: Box, margin: float) -> list[np.ndarray]:
+    """Return the parts of a component (rows of ``middles``) that are small enough, or cannot be cut."""
+    left, parts = [whole], []
+    while left:
+        piece = left.pop()
+        halves = _halves(middles[piece], box, margin)
+        if halves is None:
+            parts.append(piece)
+        else:
+            left += [piece[~halves], piece[halves]]
+    return parts
 
-    It is cut at its widest gap, but no crumbs off it. What is no wider than one object is a row of them, one behind the
-    other; what is wider may consist of neighbours either way.
+
+def _halves(middles: Ground, box: Box, margin: float) -> Bool[np.ndarray, "points"] | None:
+    """Return which cells lie beyond the widest gap, or None where they are small enough.
+
+    No crumbs are cut off. What is no wider than one object is a row of them, one behind the other; what is wider may
+    consist of neighbours either way.
     """
-    axes, sides = smallest_rectangle(middles[piece])
+    axes, sides = smallest_rectangle(middles)
     if (sides <= margin * box).all():
-        return [piece]
+        return None
     in_line = sides[1] <= margin * box[1]
     reserve = (box[0] if in_line else box[1]) / 2
-    gaps = [(*_widest_gap(middles[piece] @ axis, reserve), axis) for axis in (axes[:1] if in_line else axes)]
+    gaps = [(*_widest_gap(middles @ axis, reserve), axis) for axis in (axes[:1] if in_line else axes)]
     width, place, axis = max(gaps, key=lambda gap: gap[0])  # of equals the longer side's
-    if width == 0:
-        return [piece]
-    upper = middles[piece] @ axis > place
-    return [part for half in (piece[~upper], piece[upper]) for part in cut(middles, half, box, margin)]
+    return middles @ axis > place if width > 0 else None
 
 
 def _widest_gap(along: Float64[np.ndarray, "cells"], reserve: float) -> tuple[float, float]:

@@ -1,7 +1,8 @@
 """DS-Net's baseline: points go to where they say their centre is, and mean shift finds where they meet (Table I).
 
-scikit-learn's MeanShift, as DS-Net uses it, takes up to 10 s for the cars of a scan. This one takes the same steps from
-the same kind of seeds, all of them at once, on votes that are counted in small cells, and joins seeds that meet.
+scikit-learn's MeanShift, which DS-Net uses, takes 0.1 to 1.3 s for the cars of a scan, and 13 s for 20,000 votes that
+do not meet, as an untrained network's. This one takes the same steps from the same kind of seeds, all at once, on votes
+that are counted in small cells, and joins seeds that meet: 0.01 to 0.24 s for all things of the same scans, and 0.9 s.
 """
 
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ class MeanShift:
 
     bandwidth: float = 1.2  # m; DS-Net's
 
-    needs = "offsets"
+    needs = "offsets"  # of what heads give
 
     def __post_init__(self) -> None:
         if not self.bandwidth > 0:

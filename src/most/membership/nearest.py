@@ -14,7 +14,7 @@ from most.membership.roi import Pairs
 class Nearest(Rating):
     """Membership by distance alone; it has nothing to set and nothing to train."""
 
-    needs = "centres"
+    needs = "centres"  # of what heads give
 
     def build(self, channels: Channels) -> "Nearest":
         """It is its own network."""

@@ -29,7 +29,7 @@ class PointSegMLPSettings:
     bev: bool = True  # F_bev at the point and at the centre
     point: bool = True  # F_point
 
-    needs = "centres"
+    needs = "centres"  # of what heads give
 
     def __post_init__(self) -> None:
         if not self.widths or min(self.widths) < 1:

@@ -35,8 +35,9 @@ def observe(
     """Return the segments of things in one sweep: points of one class and one id other than 0, whatever the numbers.
 
     ``detections`` and ``claimed`` (the detection whose member a point is, -1 for none) come together. The detection
-    that claims most of a segment's points lends it centre, extent, velocity and score. Where none does (clusters,
-    predictions of others) they come from the points: their mean, their reach, no velocity, and the lowest score.
+    that claims most of a segment's points lends it centre, extent, score, and velocity if it has one. Where none does
+    (unclaimed points, predictions of others) they come from the points: their mean, their reach, no velocity, and the
+    lowest score.
     Ids are not read for that: they are numbers of ``panoptic.fuse`` only until somebody renames them.
     """
     classes, rows = _segments(panoptic, things)
