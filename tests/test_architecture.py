@@ -98,7 +98,8 @@ def test_mathematics_runs_without_lightning_and_hydra():
         if name in COMPONENTS and path.stem != "datamodule":
             text = path.read_text()
             assert "import lightning" not in text, path
-            assert "hydra" not in text, path
+            assert "import hydra" not in text, path
+            assert "from hydra" not in text, path
 
 
 def test_entry_points_and_files_stay_short():

@@ -6,23 +6,22 @@ from pathlib import Path
 import pytest
 import torch
 
-from most.assembly import FORMAT, describe, describe_run, model_parts
+from most.assembly import FORMAT, describe, describe_run, model_parts, stage1_parts, training_of
 from most.backbones import AsymmetricUNetSmallSettings
-from most.checks import check_resume, stages_to_run
-from most.config import Config, Heads
+from most.checks import check_resume, check_stage1, stages_to_run
+from most.config import Config, Heads, OffsetHeads, to_plain
 from most.datasets.augment import Augment
 from most.datasets.reader import Frame
 from most.datasets.semantickitti import SemanticKITTI, SemanticKITTISettings, Splits
 from most.errors import ConfigError, DataError
-from most.heads import OrientedCentreHead
-from most.membership import Nearest, PointSegMLPSettings
+from most.heads import OffsetHead, OrientedCentreHead
+from most.membership import Clustering, MeanShift, Nearest, PointSegMLPSettings
 from most.modal.amodal import Amodal
 from most.modal.extent import DropSmall, TrackMax
 from most.stages.detection import DetectionTraining
 from most.stages.membership import MembershipTraining
 from most.stages.settings import StageSettings
 from most.stages.trainer import TrainerSettings
-from most.training import detection_training
 from semantickitti_tree import write_sequence
 from tiny import TAXONOMY, tiny_parts
 
@@ -90,9 +89,11 @@ def test_amodal_extents_are_refused_without_boxes_and_have_a_head_of_their_own(c
 
 
 def test_extents_of_points_too_few_are_no_targets(config):
-    assert detection_training(config) is config.stage.detection
+    assert training_of(config, "detection") is config.stage.detection
     config.extent = DropSmall(min_points=3)
-    assert detection_training(config).targets.min_points == 3
+    assert training_of(config, "detection").targets.min_points == 3
+    assert training_of(config, "membership") is config.stage.membership
+    assert describe_run(config, "detection", FRAMES)["training"]["targets"]["min_points"] == 3
     assert config.stage.detection.targets.min_points == 1
 
 
@@ -161,6 +162,57 @@ def test_what_stage_2_cannot_do_is_refused_before_stage_1(config, reader, tmp_pa
         setattr(config, name, value)
     with pytest.raises(ConfigError, match=message):
         stages_to_run(config, reader, tmp_path)
+
+
+OFFSETS = {"heads": OffsetHeads(OffsetHead(8))}
+
+
+@pytest.mark.parametrize(
+    ("run", "change", "message"),
+    [
+        (["detection", "membership"], OFFSETS, "needs no centres, .* heads are offset_regression, found point_seg_mlp"),
+        (["detection"], {**OFFSETS, "membership": Nearest()}, "found nearest; choose another, or heads=modal_centres"),
+        (["detection"], {"membership": MeanShift()}, "found mean_shift; choose another, or heads=offset_regression"),
+        (["detection", "membership"], {"membership": Clustering()}, "full, found clustering; with it say stage=detect"),
+    ],
+)
+def test_a_membership_that_has_nothing_to_stand_on_is_refused(config, reader, tmp_path, run, change, message):
+    config.stage.run = run
+    for name, value in change.items():
+        setattr(config, name, value)
+    with pytest.raises(ConfigError, match=rf"membership: expected .*{message}"):
+        stages_to_run(config, reader, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "name"),
+    [
+        ({}, "nearest"),
+        (OFFSETS, "mean_shift"),
+        ({**OFFSETS, "membership": Clustering()}, "clustering"),
+        ({"membership": Clustering(link=2.0)}, "clustering"),
+    ],
+)
+def test_stage_1_by_itself_knows_a_membership_without_training(config, reader, tmp_path, change, name):
+    config.stage.run = ["detection"]
+    for key, value in change.items():
+        setattr(config, key, value)
+    assert stages_to_run(config, reader, tmp_path) == ["detection"]
+    assert to_plain("membership", stage1_parts(config)["membership"])["component"] == name
+
+
+def test_settings_that_came_after_a_checkpoint_are_at_their_defaults(config, reader, tmp_path):
+    path = save(config, tmp_path, "detection")
+    content = torch.load(path)
+    del content["most"]["parts"]["backbone"]["settings"]["separate"]
+    torch.save(content, path)
+    config.resume = str(path)
+    assert check_resume(config, reader, tmp_path) == "detection"
+    config.resume, config.stage1, config.stage.run = None, str(path), ["membership"]
+    check_stage1(config, TAXONOMY)
+    config.backbone.separate = True
+    with pytest.raises(ConfigError, match=r"was trained with another backbone: .*'separate': True.*'separate': False"):
+        check_stage1(config, TAXONOMY)
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")

@@ -18,6 +18,7 @@ from most.heads import CentreHead, OrientedCentreHead, SemanticHead
 from most.inference import Predictor
 from most.membership import Channels, MeanShift, Membership, Nearest, PointSegMLPSettings
 from most.modal.amodal import Amodal
+from most.modal.extent import DropSmall
 from most.modal.heatmap import HeatmapTargets
 from most.network import Network, Trunk
 from most.voxels import Grid
@@ -123,7 +124,7 @@ def describe_run(config: Config, stage: str, frames: Sequence[Frame]) -> dict[st
     """
     return {
         "stage": stage,
-        "training": asdict(getattr(config.stage, stage)),
+        "training": asdict(training_of(config, stage)),
         "augment": asdict(config.augment),
         "extent": to_plain("extent", config.extent),
         "scans": dict(Counter(frame.sequence for frame in frames)),
@@ -132,6 +133,14 @@ def describe_run(config: Config, stage: str, frames: Sequence[Frame]) -> dict[st
         "processes": config.trainer.processes(),
         "weights": config.weights,
     }
+
+
+def training_of(config: Config, stage: str) -> Any:
+    """Return a stage's settings, the heat maps' with what the extent strategy drops."""
+    settings = getattr(config.stage, stage)
+    if stage != "detection" or not isinstance(config.extent, DropSmall):
+        return settings
+    return replace(settings, targets=replace(settings.targets, min_points=config.extent.min_points))
 
 
 def describe_taxonomy(taxonomy: Taxonomy) -> dict[str, Any]:

@@ -122,7 +122,7 @@ def classify(output: NetworkOutput, samples: list[Sample], grid: Grid, fallback:
         features[inside] = output.point_features[output.current[rows]]
         offsets = None
         if output.offsets is not None:
-            offsets = output.offsets.new_zeros(len(semantics), 3).index_copy(0, inside, output.offsets[rows])
+            offsets = output.offsets.new_zeros(len(semantics), 3).index_copy(0, inside, output.offsets[rows].detach())
         results.append(Classified(semantics, probabilities, features, offsets))
         start += len(sample.points)
     return results

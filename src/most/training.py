@@ -22,13 +22,13 @@ from most.assembly import (
     model_parts,
     read_checkpoint,
     stage1_parts,
+    training_of,
 )
 from most.config import Config
 from most.datasets.class_counts import class_counts
 from most.datasets.datamodule import SweepDataModule
 from most.datasets.reader import Reader
 from most.membership import PointSegMLP
-from most.modal.extent import DropSmall
 from most.stages.callbacks import Throughput
 from most.stages.checkpoints import AtomicCheckpointIO, LastCheckpoint
 from most.stages.detection import DetectionStage, DetectionTraining
@@ -56,20 +56,12 @@ def build_detection(config: Config, data: SweepDataModule) -> DetectionStage:
     if config.weights is not None:
         load_weights(network, "network", read_checkpoint(stage1_file(config, Path(config.weights)))["state_dict"])
     predictor = build_predictor(network, parts, taxonomy)
-    training = detection_training(config)
+    training: DetectionTraining = training_of(config, "detection")
     balanced = training.losses.class_balance > 0
     counts = class_counts(data.reader, "train") if balanced else torch.ones(taxonomy.num_classes, dtype=torch.long)
     scans = len(data.reader.frames("train"))
     steps = training.epochs * steps_per_epoch(config, scans)
     return DetectionStage(predictor, taxonomy, counts, training, _notes(config, "detection", parts, data.reader), steps)
-
-
-def detection_training(config: Config) -> DetectionTraining:
-    """Return stage 1's settings, with the targets that the extent strategy leaves out."""
-    training: DetectionTraining = config.stage.detection
-    if not isinstance(config.extent, DropSmall):
-        return training
-    return replace(training, targets=replace(training.targets, min_points=config.extent.min_points))
 
 
 def steps_per_epoch(config: Config, scans: int) -> int:

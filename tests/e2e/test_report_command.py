@@ -31,6 +31,8 @@ def test_from_two_trainings_to_the_report(tmp_path: Path) -> None:
         assert rows[title]["seeds"] == "1 2"
         assert float(rows[title]["PQ low"]) <= float(rows[title]["PQ"]) <= float(rows[title]["PQ high"])
 
+    assert "full (widths=[4,4])." in (tmp_path / "report/report.md").read_text()
+
     refused = most(tmp_path, "report", "runs=runs", "out=other", "baseline=trackmax")
     assert refused.returncode == 2
     assert "baseline: expected one of track_max, nearest, full, found trackmax" in refused.stderr

@@ -34,11 +34,16 @@ def test_stage_1_alone_is_scored_by_what_needs_no_training(tmp_path: Path) -> No
     ]  # fmt: skip
 
 
-def test_changed_settings_make_another_strategy(tmp_path: Path) -> None:
-    example_run(tmp_path, example_sums(0.7, 1), overrides=("extent=track_max", "extent.floor=0.1", "seed=1"))
-    (found,) = find_runs(tmp_path).scored
-    assert found.strategy.extent == "track_max (floor=0.1)"
-    assert found.strategy.title == "Modal Det. (MAX (floor=0.1))"
+def test_changed_settings_make_another_strategy_where_not_all_runs_have_them(tmp_path: Path) -> None:
+    changed = ("extent=track_max", "extent.floor=0.1", "heads.centre.channels=8", "membership.widths=[4]")
+    example_run(tmp_path / "a", example_sums(0.7, 1), overrides=changed, nearest=example_sums(0.6, 1))
+    (alone,) = group(find_runs(tmp_path).scored)
+    assert [each.title for each in alone.strategies] == ["Modal Det. (MAX)"] * 2
+    assert alone.settings == ["track_max (floor=0.1)", "modal_centres (centre.channels=8)", "full (widths=[4])"]
+    example_run(tmp_path / "b", example_sums(0.7, 1), nearest=example_sums(0.6, 1), overrides=changed[2:])
+    (both,) = group(find_runs(tmp_path).scored)
+    assert {each.title for each in both.strategies} == {"Modal Det. (MAX)", "Modal Det. (MAX) (floor=0.1)"}
+    assert both.settings == ["modal_centres (centre.channels=8)", "full (widths=[4])"]
 
 
 def test_what_most_evaluate_said_counts_under_the_name_of_its_file(tmp_path: Path) -> None:

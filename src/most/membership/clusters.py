@@ -43,7 +43,7 @@ def claims_of(evidence: Evidence, clusters: Int64[Tensor, "points"]) -> Claims:
     own = clusters >= 0
     row, points, count = clusters[own], evidence.points[own], int(clusters.max()) + 1 if own.any() else 0
     classes = clusters.new_zeros(count).index_copy_(0, row, evidence.semantics[own])
-    sure = evidence.probabilities[own].gather(1, classes[row, None] - 1).squeeze(1).double()
+    sure = evidence.probabilities[own].detach().gather(1, classes[row, None] - 1).squeeze(1).double()
     sizes = torch.bincount(row, minlength=count)
     centres, extents = measure(points, row, count)
     found = Detections(

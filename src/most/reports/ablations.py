@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from most.reports.analysis import BySeed
 from most.reports.groups import Group
-from most.reports.strategy import PAPER, Strategy
+from most.reports.strategy import Strategy
 
 AMODALIZATION = {
     "PQ": "pq", "PQ Th": "pq_things", "PQ St": "pq_stuff",
@@ -47,12 +47,12 @@ def amodalization(group: Group) -> Ablation:
 
     Offsets have no detected centres, so theirs is their own.
     """
-    by_membership = _by(group.strategies, lambda each: each.membership if each.heads == PAPER else "")
+    by_membership = _by(group.strategies, lambda each: each.membership if each.has_centres else "")
     offsets = by_membership.pop("", [])
     widest = max(by_membership.values(), key=lambda rows: (len(rows), rows[0].order[-2:]), default=[])
     rows = {each.detection: each for each in [*offsets, *widest]}
     ways = dict.fromkeys(each.membership_title for each in rows.values())
-    notes = (f"Membership here: {'; '.join(ways)}.", PRESENT)
+    notes = (f"Membership here: {'; '.join(ways)}.", *_settings(group), PRESENT)
     title = "Table I: strategies for amodalization"
     return Ablation("table1", title, rows, AMODALIZATION, notes, "shrink_wrap", beside=False)
 
@@ -63,9 +63,14 @@ def memberships(group: Group) -> Ablation:
         _by(group.strategies, lambda each: each.detection).values(),
         key=lambda rows: (len(rows), rows[0].extent == "track_max"),
     )
-    notes = (f"Stage 1 here: {found[0].title}.", CONTESTED, PRESENT)
+    notes = (f"Stage 1 here: {found[0].title}.", *_settings(group), CONTESTED, PRESENT)
     rows = {each.membership: each for each in found}
     return Ablation("table2", "Table II: membership functions", rows, MEMBERSHIP, notes, "nearest", beside=True)
+
+
+def _settings(group: Group) -> list[str]:
+    """Say which settings all runs of a strategy have that are not its own."""
+    return [f"Settings here: {'; '.join(group.settings)}."] if group.settings else []
 
 
 def _by(strategies: Sequence[Strategy], key: Callable[[Strategy], str]) -> dict[str, list[Strategy]]:

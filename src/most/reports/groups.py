@@ -2,13 +2,13 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from most.errors import DataError
 from most.reports.runs import BESIDE, EVALUATED, VALIDATED, Scored
-from most.reports.strategy import AXES, Strategy
+from most.reports.strategy import AXES, Strategy, plain_names
 from most.reports.sums import Measured
 
 ASIDE = {  # keys that say who ran it, where and how far it is; or that strategies need to differ in
@@ -25,6 +25,7 @@ class Group:
     title: str
     dataset: str
     measured: Measured
+    settings: list[str] = field(default_factory=list)  # of strategies, where the command line changed them in all runs
     rows: dict[Strategy, dict[str, dict[int, Scored]]] = field(default_factory=dict)  # by source and seed
 
     def add(self, scored: Scored) -> None:
@@ -50,17 +51,25 @@ class Group:
 
 def group(scored: list[Scored]) -> list[Group]:
     """Part runs into groups, the one with most strategies first."""
-    groups: dict[str, Group] = {}
+    parts: dict[str, list[Scored]] = {}
     kept: dict[str, dict[str, Any]] = {}
     for each in scored:
         rest = common_part(each.config) | {"experiment": each.choices.get("experiment")}
         key = json.dumps(rest, sort_keys=True, default=str) + repr(each.sums.measured)
-        if key not in groups:
-            kept[key] = rest
-            groups[key] = Group("", str(each.choices["dataset"]), each.sums.measured)
-        groups[key].add(each)
+        kept[key] = rest
+        parts.setdefault(key, []).append(each)
+    groups = {key: _group(part) for key, part in parts.items()}
     _entitle(groups, kept)
     return sorted(groups.values(), key=lambda each: (-len(each.rows), each.title))
+
+
+def _group(scored: list[Scored]) -> Group:
+    """Put together what may be compared."""
+    found = Group("", str(scored[0].choices["dataset"]), scored[0].sums.measured)
+    found.settings, names = plain_names([each.strategy for each in scored])
+    for each in scored:
+        found.add(replace(each, strategy=names[each.strategy]))
+    return found
 
 
 def common_part(config: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -85,7 +85,7 @@ def _bar(axes: Axes, at: float, cell: Interval | None, seeds: Iterable[float], s
     if cell is None:
         return
     values = [100 * value for value in seeds]
-    axes.plot(values, [at] * len(values), ".", color=COLOURS[series], alpha=0.5, markersize=4)
+    axes.plot(values, [at + 0.12] * len(values), ".", color=COLOURS[series], alpha=0.6, markersize=4)
     low, high = (cell.value if bound is None else bound for bound in (cell.low, cell.high))
     axes.hlines(at, 100 * low, 100 * high, color=COLOURS[series], linewidth=2)
     axes.plot([100 * cell.value], [at], MARKS[series], color=COLOURS[series], label=label, markersize=7)

@@ -1,7 +1,7 @@
 """What tells the rows of Tables I and II apart, read from a run's configuration."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 EXTENTS = {"shrink_wrap": "SW", "drop_small": "DSB", "class_mean": "CWM", "track_max": "MAX", "amodal": "amodal"}
@@ -28,24 +28,29 @@ class Strategy:
     membership: str
 
     @property
+    def has_centres(self) -> bool:
+        """Whether modal centres are detected, as the paper does."""
+        return _parted(self.heads)[0] == PAPER
+
+    @property
     def detection(self) -> str:
         """What Table I tells apart: all but the membership."""
-        first = self.heads if self.heads != PAPER else self.extent
+        first = self.extent + _parted(self.heads)[1] if self.has_centres else self.heads
         return first + ("+separate" if self.separate else "")
 
     @property
     def title(self) -> str:
         """The row's title in Table I."""
-        base, changed = _parted(self.extent)
-        name = EXTENTS.get(base, base) + changed
-        if self.heads != PAPER:
-            offsets, changed = _parted(self.heads)
-            how = "Offset reg. (DS-Net)" if offsets == "offset_regression" else offsets
-            return how + changed + (", w/o sharing" if self.separate else "")
-        if base == "amodal":
-            return f"Amodal Det.{changed}" + (", w/o sharing" if self.separate else "")
-        shared = ", w/ sharing" if base == "shrink_wrap" else ""
-        return f"Modal Det. ({name})" + (", w/o sharing" if self.separate else shared)
+        extent, changed = _parted(self.extent)
+        heads, changed_heads = _parted(self.heads)
+        apart = (", w/o sharing" if self.separate else "") + changed_heads
+        if not self.has_centres:
+            return ("Offset reg. (DS-Net)" if heads == "offset_regression" else heads) + apart
+        if extent == "amodal":
+            return f"Amodal Det.{changed}{apart}"
+        if extent == "shrink_wrap" and not self.separate:  # told apart in the paper
+            apart = f", w/ sharing{apart}"
+        return f"Modal Det. ({EXTENTS.get(extent, extent)}){changed}{apart}"
 
     @property
     def membership_title(self) -> str:
@@ -58,7 +63,7 @@ class Strategy:
         """Sorts rows as the paper has them."""
         extent, membership = _parted(self.extent)[0], _parted(self.membership)[0]
         return (
-            self.heads == PAPER, _place(extent, EXTENTS), self.extent, not self.separate, self.heads,
+            self.has_centres, _place(extent, EXTENTS), self.extent, not self.separate, self.heads,
             _place(membership, MEMBERSHIPS), self.membership,
         )  # fmt: skip
 
@@ -67,8 +72,24 @@ def strategy_of(config: Mapping[str, Any], choices: Mapping[str, Any], overrides
     """Name a run's strategy by the choices and overrides that Hydra wrote down."""
     named = {group: str(choices.get(group, PAPER)) + _changed(group, overrides) for group in AXES}
     if "membership" not in config["stage"]["run"] and choices["membership"] not in UNTRAINED:
-        named["membership"] = "nearest" if named["heads"] == PAPER else "mean_shift"  # stage 1's stand-in
+        named["membership"] = "nearest" if _parted(named["heads"])[0] == PAPER else "mean_shift"  # stage 1's stand-in
     return Strategy(separate=bool(config["backbone"].get("separate", False)), **named)
+
+
+def plain_names(strategies: Sequence[Strategy]) -> tuple[list[str], dict[Strategy, Strategy]]:
+    """Leave out changed settings that no two strategies differ in; return those, and the new names."""
+    said: dict[str, None] = {}
+    names = {each: each for each in strategies}
+    for axis in AXES:
+        variants: dict[str, set[str]] = {}
+        for each in strategies:
+            variants.setdefault(_parted(getattr(each, axis))[0], set()).add(getattr(each, axis))
+        shared = {next(iter(of)): base for base, of in variants.items() if len(of) == 1}
+        said |= dict.fromkeys(name for name, base in shared.items() if name != base)
+        for old, new in names.items():
+            name = getattr(new, axis)
+            names[old] = replace(new, **{axis: shared.get(name, name)})
+    return list(said), names
 
 
 def _changed(group: str, overrides: list[str]) -> str:
