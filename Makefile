@@ -77,7 +77,7 @@ SWEEP = $(RUN) -m most.train -m +experiment=$(EXPERIMENT_$(SIZE)) seed=$(SEEDS_$
 ablation: setup
 	$(RUN) -m most.simulate simulation=ablation out=$(ABLATION)/streets
 	$(SWEEP) extent=$(EXTENTS)
-	$(SWEEP) extent=shrink_wrap membership=$(MEMBERSHIPS) stage=membership 'stage1=$(RUNS)/extent=shrink_wrap+seed=$${seed}'
+	$(SWEEP) extent=shrink_wrap membership=$(MEMBERSHIPS) stage=membership 'stage1=$(RUNS)/extent-shrink_wrap+seed-$${seed}'
 	$(RUN) -m most.report runs=$(RUNS) out=$(ABLATION)/report_$(SIZE)
 
 # Real scans, where there are any: MOST_REAL_DATA=FOLDER make test (FOLDER holds semantickitti/sequences/NN and nuscenes).

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from hydra import compose, initialize_config_dir
+from hydra.core.override_parser.overrides_parser import OverridesParser
 from omegaconf import OmegaConf
 
 from most.config import Config, conf_dir, register, typed
@@ -58,28 +59,29 @@ def leave(job: Job, *files: str, settings: Job | None = None) -> None:
 @pytest.mark.parametrize(
     ("overrides", "name"),
     [
-        (["extent=track_max", "seed=1"], "extent=track_max+seed=1"),
-        (["seed=1", "+experiment=sim_ablation", "extent=track_max"], "extent=track_max+seed=1"),
-        (["stage.detection.epochs=2", "seed=1"], "seed=1+stage.detection.epochs=2"),
-        (["logger=none", "logger.pictures=0", "trainer.threads=1", "dataset.root=a/b", "seed=3"], "seed=3"),
-        (["trainer.validate_every=2"], "trainer.validate_every=2"),
-        (["dataset.splits.val=['07']", "seed=1"], "seed=1+dataset.splits.val=__07__"),
+        (["extent=track_max", "seed=1"], "extent-track_max+seed-1"),
+        (["seed=1", "+experiment=sim_ablation", "extent=track_max"], "extent-track_max+seed-1"),
+        (["stage.detection.epochs=2", "seed=1"], "seed-1+stage.detection.epochs-2"),
+        (["logger=none", "logger.pictures=0", "trainer.threads=1", "dataset.root=a/b", "seed=3"], "seed-3"),
+        (["trainer.validate_every=2"], "trainer.validate_every-2"),
+        (["dataset.splits.val=['07']", "seed=1"], "seed-1+dataset.splits.val-__07__"),
         (["logger=none"], "default"),
     ],
 )
 def test_a_job_is_named_by_what_it_trains(overrides, name):
     assert job_name(overrides) == name
+    OverridesParser.create().parse_override(f"stage1=sweep/{name}/checkpoints/detection-last.ckpt")  # needs no quotes
 
 
 def test_long_names_stay_apart():
     names = {job_name(["seed=1", f"encoder.widths=[{'32,' * 40}{last}]"]) for last in (1, 2)}
     assert len(names) == 2
-    assert all(len(name) <= 120 and name.startswith("seed=1+encoder.widths=_32_32") for name in names)
+    assert all(len(name) <= 120 and name.startswith("seed-1+encoder.widths-_32_32") for name in names)
 
 
 def test_jobs_write_below_the_folder_of_their_sweep_and_that_of_the_experiment(make):
-    assert make("seed=2").folder == Path("outputs/most/sweep/seed=2")
-    assert make("+experiment=sim_ablation", "seed=2").folder == Path("outputs/sim_ablation/sweep/seed=2")
+    assert make("seed=2").folder == Path("outputs/most/sweep/seed-2")
+    assert make("+experiment=sim_ablation", "seed=2").folder == Path("outputs/sim_ablation/sweep/seed-2")
 
 
 def test_jobs_that_can_run_pass(make):
@@ -89,10 +91,10 @@ def test_jobs_that_can_run_pass(make):
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ("seed=-1", r"job seed=-1: seed: expected a number in"),
+        ("seed=-1", r"job seed--1: seed: expected a number in"),
         ("dataset.root=nowhere", r"job default: nowhere/sequences: expected"),
-        ("trainer.devices=2", r"job trainer.devices=2: trainer.devices: expected one process for each job"),
-        ("stage=membership", r"job stage=membership: stage1: expected a checkpoint of stage 1, found none"),
+        ("trainer.devices=2", r"job trainer.devices-2: trainer.devices: expected one process for each job"),
+        ("stage=membership", r"job stage-membership: stage1: expected a checkpoint of stage 1, found none"),
         ("logger=none", r"default: expected jobs that differ in what they train, found two of this name"),
     ],
 )
@@ -116,7 +118,7 @@ def test_a_job_goes_on_with_its_latest_stage(make):
     assert standing(job.folder) == str(job.folder / "checkpoints/detection-last.ckpt")
     (job.folder / "checkpoints/membership-last.ckpt").touch()
     assert standing(job.folder) == str(job.folder / "checkpoints/membership-last.ckpt")
-    with pytest.raises(DataError, match=r"job seed=1: .*membership-last.ckpt: expected a checkpoint, found something"):
+    with pytest.raises(DataError, match=r"job seed-1: .*membership-last.ckpt: expected a checkpoint, found something"):
         check_jobs([job])
 
 
@@ -129,7 +131,7 @@ def test_a_job_goes_on_with_its_latest_stage(make):
     ],
 )
 def test_a_folder_of_other_settings_is_refused_whether_finished_or_not(make, other, message):
-    job, expected = make("seed=1"), rf"job seed=1: outputs/most/sweep/seed=1 {message}; .* choose another hydra"
+    job, expected = make("seed=1"), rf"job seed-1: outputs/most/sweep/seed-1 {message}; .* choose another hydra"
     leave(job, "metrics.json", settings=make("seed=1", other))
     with pytest.raises(ConfigError, match=expected):
         check_jobs([job])
@@ -145,7 +147,7 @@ def test_settings_that_were_cut_off_in_writing_are_named(make, text):
     leave(job, "metrics.json")
     for name in ("config.yaml", "hydra.yaml"):
         (job.folder / ".hydra" / name).write_text(text)
-    with pytest.raises(DataError, match=r"job seed=1: .*/\.hydra: expected the settings that the job began with"):
+    with pytest.raises(DataError, match=r"job seed-1: .*/\.hydra: expected the settings that the job began with"):
         check_jobs([job])
 
 
@@ -161,7 +163,7 @@ def test_a_job_is_told_its_group_its_name_and_where_it_stopped(make):
     job = make("seed=1")
     leave(job, "checkpoints/detection-last.ckpt")
     config: Config = in_sweep(typed(job.settings()), "outputs/most/sweep", job.folder)
-    assert (config.logger.group, config.name) == ("outputs/most/sweep", "seed=1")
+    assert (config.logger.group, config.name) == ("outputs/most/sweep", "seed-1")
     assert config.resume == str(job.folder / "checkpoints/detection-last.ckpt")
     grouped = typed(make("logger.group=mine", "seed=2").settings())
     assert in_sweep(grouped, "outputs/most/sweep", Path("elsewhere")).logger.group == "mine"
@@ -203,14 +205,14 @@ def test_failed_jobs_are_reported_with_their_folders_and_reasons(make):
     report(jobs, [0.5, 0.25, None])
     with pytest.raises(FailedError) as failure:
         report(jobs, [0.5, MostError("no room"), None])
-    said = "1 of 3 jobs failed; repeat the command to try them again\n  outputs/most/sweep/seed=2: no room"
+    said = "1 of 3 jobs failed; repeat the command to try them again\n  outputs/most/sweep/seed-2: no room"
     assert (str(failure.value), failure.value.exit_code) == (said, 1)
 
 
 def test_a_launcher_that_loses_a_process_names_what_is_left(make):
     jobs = [make("seed=1"), make("seed=2")]
     leave(jobs[0], "metrics.json")
-    with pytest.raises(FailedError, match=r"\(OSError: killed\); .* go on with 1 of 2 jobs: seed=2"), stopping(jobs):
+    with pytest.raises(FailedError, match=r"\(OSError: killed\); .* go on with 1 of 2 jobs: seed-2"), stopping(jobs):
         raise OSError("killed")
     with pytest.raises(StoppedError, match="repeat the command") as stop, stopping(jobs):
         raise KeyboardInterrupt

@@ -62,14 +62,15 @@ class Job:
 
 
 def job_name(overrides: Sequence[str]) -> str:
-    """Return what a job is called, in whatever order it was told: ``extent=track_max+seed=1``, fit for a shell.
+    """Return what a job is called, in whatever order it was told: ``extent-track_max+seed-1``.
 
+    It can stand in a command without quotes, though Hydra takes no = there.
     Choices come first: a long name ends in a digest.
     """
     told = [override.lstrip("+") for override in overrides]
     kept = [override for override in told if not _is_of(override.split("=")[0], (*NO_FIGURE, *ELSEWHERE))]
     kept.sort(key=lambda override: ("." in override or "/" in override, override))
-    name = re.sub(r"[^\w.=+-]", "_", "+".join(kept)) or "default"
+    name = re.sub(r"[^\w.+-]", "_", "+".join(kept).replace("=", "-")) or "default"
     if len(name) <= LONGEST:
         return name
     digest = hashlib.sha256(name.encode()).hexdigest()[:12]

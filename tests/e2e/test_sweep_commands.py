@@ -15,7 +15,7 @@ from wandb_run import read_run
 
 SETTINGS = ["+experiment=sim_demo", "dataset.root=tree", "dataset.tables=tables", *SPLITS, *TINY, "logger=none",
             "logger.pictures=0", "trainer.progress_bar=false", "stage.detection.epochs=1"]  # fmt: skip
-NAMES = [f"extent={extent}+seed={seed}" for extent in ("shrink_wrap", "track_max") for seed in (1, 2)]
+NAMES = [f"extent-{extent}+seed-{seed}" for extent in ("shrink_wrap", "track_max") for seed in (1, 2)]
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def sweep(folder: Path, *arguments: str, signal: Signal | None = None) -> Done:
 
 def jobs(folder: Path) -> dict[str, Path]:
     """The jobs' folders by the beginning of their names."""
-    return {path.name.partition("+stage=")[0]: path for path in (folder / "sweep").iterdir() if path.is_dir()}
+    return {path.name.partition("+stage-")[0]: path for path in (folder / "sweep").iterdir() if path.is_dir()}
 
 
 @pytest.fixture(scope="module")
@@ -99,11 +99,11 @@ def test_memberships_share_one_stage_1_that_a_runs_folder_names(continued):
                 "extent=track_max", "membership=geometric,full", "stage1=stage1_${seed}",
                 "hydra/launcher=submitit_local")  # fmt: skip
     assert done.returncode == 0, done.stderr
-    runs = {path.name: read_run(path) for path in (continued / "stage2").glob("extent=*")}
+    runs = {path.name: read_run(path) for path in (continued / "stage2").glob("extent-*")}
     assert {(run.group, run.name) for run in runs.values()} == {("stage2", name) for name in runs}
     told = [(run.config["choices"]["membership"], run.config["overrides"]["membership"]) for run in runs.values()]
     assert sorted(told) == [("full", "full"), ("geometric", "geometric")]
-    made = sorted((continued / "stage2").glob("extent=*/checkpoints/*"))
+    made = sorted((continued / "stage2").glob("extent-*/checkpoints/*"))
     assert [path.name for path in made] == ["membership-last.ckpt"] * 2
     networks = [torch.load(path, weights_only=True)["state_dict"] for path in made]
     shared = [name for name in networks[0] if name.startswith("network.")]
