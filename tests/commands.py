@@ -7,6 +7,7 @@ import resource
 import runpy
 import subprocess
 import sys
+import threading
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -47,6 +48,7 @@ COMMANDS = (
     "oracle",
     "velocity",
     "report",
+    "dashboard",
 )
 PRELOADED = [f"most.{command}" for command in COMMANDS]
 
@@ -160,3 +162,4 @@ def _as_main(
     finally:
         sys.stdout.flush()
         sys.stderr.flush()
+        threading._shutdown()  # as an interpreter's end does, before it waits for processes: joblib's end by this

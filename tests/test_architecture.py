@@ -17,7 +17,7 @@ COMPONENTS = {
     "normed_pair": {"norm", "normed_linear"},
     "encoder": {"voxels", "normed_linear", "normed_pair"},
     "backbones": {"norm", "sparse"},
-    "heads": {"norm"},
+    "heads": {"norm", "normed_linear"},
     "losses": {"modal"},
     "detections": {"voxels"},
     "membership": {"voxels", "normed_linear"},
@@ -27,21 +27,20 @@ COMPONENTS = {
     "reports": {"metrics"},
     "simulation": {"datasets"},
 }
-ENTRY_POINTS = {
-    "train",
-    "predict",
-    "evaluate",
-    "compare",
-    "simulate",
-    "draw",
-    "submit",
-    "track",
-    "velocity",
-    "view",
-    "oracle",
-    "report",
-}
-OUTER = {"entry", "config", "assembly", "training", "checks", "streaming", "predicting", "predicting_scans"}
+LAYERS = [  # above the components: each knows all that are before it; docs/architecture.md says the same
+    ["claims", "device", "entry", "logs", "network", "submission"],
+    ["inference", "relabelling"],
+    ["ladder", "predictions", "stages", "viz"],
+    ["config"],
+    ["assembly"],
+    ["streaming", "training"],
+    ["checks", "predicting"],
+    ["predicting_scans", "sweeps"],
+]
+COMMANDS = [
+    "compare", "dashboard", "draw", "evaluate", "oracle", "predict", "report", "simulate", "submit", "track", "train",
+    "velocity", "view",
+]  # fmt: skip
 
 
 def imported(path):
@@ -74,12 +73,24 @@ def test_components_know_the_foundation_and_their_stated_exceptions():
             assert imported(path) <= FOUNDATION | {name} | COMPONENTS[name], path
 
 
-def test_nobody_imports_an_entry_point_and_nothing_below_the_configuration_imports_it():
-    for name, path in files():
-        others = imported(path) - {name}
-        assert not others & ENTRY_POINTS, path
-        if name not in ENTRY_POINTS | OUTER:
-            assert not others & OUTER, path
+def test_what_is_above_knows_the_layers_below_and_nobody_knows_a_command():
+    below = FOUNDATION | set(COMPONENTS)
+    for layer in [*LAYERS, COMMANDS]:
+        for name, path in files():
+            if name in layer:
+                assert imported(path) <= below | {name}, path
+        below |= set(layer)
+
+
+def test_every_module_has_its_place():
+    placed = [*FOUNDATION, *COMPONENTS, *(name for layer in LAYERS for name in layer), *COMMANDS]
+    assert sorted(placed) == sorted({name for name, _ in files()})
+
+
+def test_the_order_is_the_documented_one():
+    documented = " ".join((Path(__file__).parents[1] / "docs" / "architecture.md").read_text().split())
+    order = " <- ".join(", ".join(layer) for layer in LAYERS)
+    assert f"components <- {order} <- commands" in documented
 
 
 def test_mathematics_runs_without_lightning_and_hydra():
@@ -93,5 +104,5 @@ def test_mathematics_runs_without_lightning_and_hydra():
 
 def test_entry_points_and_files_stay_short():
     assert all(len(path.read_text().splitlines()) <= 300 for _, path in files())
-    for name in ENTRY_POINTS:
+    for name in COMMANDS:
         assert len((ROOT / f"{name}.py").read_text().splitlines()) <= 80, name

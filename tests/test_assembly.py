@@ -6,12 +6,13 @@ from pathlib import Path
 import pytest
 import torch
 
-from most.assembly import FORMAT, check_taxonomy, describe, load_trained
-from most.backbones import AsymmetricUNetSettings, ResidualUNetSettings
+from most.assembly import FORMAT, check_taxonomy, describe, exchange_membership, load_trained
+from most.backbones import AsymmetricUNetSettings, AsymmetricUNetSmallSettings, ResidualUNetSettings
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError, DataError
-from most.heads import SemanticHead
-from most.membership import PointSegMLPSettings
+from most.heads import OffsetHead, OrientedCentreHead, SemanticHead
+from most.membership import Clustering, MeanShift, Nearest, PointSegMLPSettings
+from most.modal.heatmap import HeatmapTargets
 from tiny import TAXONOMY, cloud, street, tiny_parts, tiny_predictor, window
 
 SAMPLES = [street(), window(cloud(40), cloud(20, 1))]
@@ -32,7 +33,8 @@ def save(folder: Path, content) -> Path:
 
 
 def tensors(prediction):
-    return [*vars(prediction.panoptic).values(), *vars(prediction.detections).values(), prediction.roi]
+    found = [*vars(prediction.panoptic).values(), *vars(prediction.detections).values(), prediction.roi]
+    return [value.nan_to_num(-99.0) for value in found if value is not None]  # velocities of clusters are NaN
 
 
 @pytest.mark.parametrize(
@@ -42,12 +44,21 @@ def tensors(prediction):
         {"backbone": AsymmetricUNetSettings(widths=[4, 4, 8, 8], bev_channels=8)},
         {"backbone": ResidualUNetSettings(widths=[4, 4, 8, 8], bev_channels=4), "semantic_head": SemanticHead(False)},
         {"membership": PointSegMLPSettings([4])},
+        {"centre_head": OrientedCentreHead(channels=8)},
+        {"membership": Clustering(margin=1.5)},
+        {"centre_head": OffsetHead(8), "membership": MeanShift(0.9)},
+        {"backbone": ResidualUNetSettings(widths=[4, 4, 8, 8], bev_channels=4, separate=True)},
+        {
+            "backbone": AsymmetricUNetSmallSettings(widths=[4, 4, 8, 8], bev_channels=4, separate=True),
+            "membership": PointSegMLPSettings([4]),
+        },
     ],
 )
 def test_a_loaded_model_predicts_bit_for_bit_what_the_saved_one_did(tmp_path, changes):
     predictor = tiny_predictor(**changes)
     predictor.network(SAMPLES)  # moves the batch statistics from where they start
-    predictor.network.centre_head.heatmap.bias.data += 2.0  # for some detections
+    if "centre_head" not in changes:
+        predictor.network.centre_head.heatmap.bias.data += 2.0  # for some detections
     for part in predictor.modules().values():
         part.eval()
     trained = load_trained(save(tmp_path, checkpoint(predictor, **changes)))
@@ -56,6 +67,70 @@ def test_a_loaded_model_predicts_bit_for_bit_what_the_saved_one_did(tmp_path, ch
     for before, after in zip(predictor(SAMPLES), trained.predictor(SAMPLES), strict=True):
         assert len(before.detections) > 0
         assert all(torch.equal(*pair) for pair in zip(tensors(before), tensors(after), strict=True))
+
+
+DRAWN = {"kind": "gaussian_radius", "min_variance": 1.0, "min_overlap": 0.2, "min_radius": 3, "min_points": 5}
+
+
+@pytest.mark.parametrize(
+    ("told", "targets"),
+    [
+        ({"most_run": {"stage": "detection", "training": {"targets": DRAWN}}}, HeatmapTargets(**DRAWN)),
+        (
+            {
+                "most_run": {"stage": "membership", "training": {}},
+                "most_stage1": {"stage": "detection", "training": {"targets": DRAWN}},
+            },
+            HeatmapTargets(**DRAWN),
+        ),
+        ({"most_run": {"stage": "membership", "training": {}}}, None),  # of a time when stage 2 did not say
+    ],
+)
+def test_a_checkpoint_of_either_stage_says_how_heat_maps_were_drawn(tmp_path, told, targets):
+    trained = load_trained(save(tmp_path, checkpoint(tiny_predictor()) | told))
+    assert trained.targets == targets
+    if targets is None:
+        with pytest.warns(UserWarning, match="does not say how heat maps were drawn: the default is taken"):
+            assert trained.likely_targets() == HeatmapTargets()
+    else:
+        assert trained.likely_targets() == targets
+
+
+@pytest.mark.parametrize("targets", [{"kind": "square"}, {"radius": 2}, 7])
+def test_heat_maps_that_cannot_be_drawn_are_refused(tmp_path, targets):
+    run = {"stage": "detection", "training": {"targets": targets}}
+    with pytest.raises(DataError, match=r"some\.ckpt: expected a model that this version of most can make"):
+        load_trained(save(tmp_path, checkpoint(tiny_predictor()) | {"most_run": run}))
+
+
+def test_a_checkpoint_without_a_later_setting_has_its_default(tmp_path):
+    content = checkpoint(tiny_predictor())
+    del content["most"]["parts"]["backbone"]["settings"]["separate"]
+    assert load_trained(save(tmp_path, content)).predictor.network.detection is None
+
+
+def test_another_membership_without_training_is_put_on_the_same_network(tmp_path):
+    trained = load_trained(save(tmp_path, checkpoint(tiny_predictor(membership=PointSegMLPSettings([4])),
+                                                     membership=PointSegMLPSettings([4]))))  # fmt: skip
+    for membership in (Nearest(), Clustering()):
+        other = exchange_membership(trained, membership)
+        assert other.predictor.network is trained.predictor.network
+        assert set(other.predictor.modules()) == {"network"}
+        other.predictor(SAMPLES)
+
+
+@pytest.mark.parametrize(
+    ("head", "membership", "message"),
+    [
+        ({}, PointSegMLPSettings(), "expected one without training, such as nearest, found one that stage 2 trains"),
+        ({}, MeanShift(), "expected one that needs no offsets, as the model's heads are modal_centres, found mean_s"),
+        ({"centre_head": OffsetHead(8), "membership": MeanShift()}, Nearest(), "needs no centres.*found nearest"),
+    ],
+)
+def test_a_membership_that_does_not_fit_the_network_is_refused(tmp_path, head, membership, message):
+    trained = load_trained(save(tmp_path, checkpoint(tiny_predictor(**head), **head)))
+    with pytest.raises(ConfigError, match=message):
+        exchange_membership(trained, membership)
 
 
 def test_a_checkpoint_is_plain(tmp_path):

@@ -1,21 +1,23 @@
 """What a training is asked to do is held against what there is, before any work."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
 import torch
 
-from most.assembly import FORMAT, describe, describe_run, model_parts
+from most.assembly import FORMAT, describe, describe_run, model_parts, stage1_parts, training_of
 from most.backbones import AsymmetricUNetSmallSettings
-from most.checks import check_resume, stages_to_run
-from most.config import Config, Heads
+from most.checks import check_resume, check_stage1, stages_to_run
+from most.config import Config, Heads, OffsetHeads, to_plain
 from most.datasets.augment import Augment
 from most.datasets.reader import Frame
 from most.datasets.semantickitti import SemanticKITTI, SemanticKITTISettings, Splits
 from most.errors import ConfigError, DataError
-from most.membership import Nearest, PointSegMLPSettings
-from most.modal.extent import TrackMax
+from most.heads import OffsetHead, OrientedCentreHead
+from most.membership import Clustering, MeanShift, Nearest, PointSegMLPSettings
+from most.modal.amodal import Amodal
+from most.modal.extent import DropSmall, TrackMax
 from most.stages.detection import DetectionTraining
 from most.stages.membership import MembershipTraining
 from most.stages.settings import StageSettings
@@ -64,6 +66,41 @@ def save(config: Config, folder: Path, stage: str) -> Path:
 def test_a_run_goes_on_with_the_stage_of_its_checkpoint(config, reader, tmp_path, stage, left):
     config.resume = str(save(config, tmp_path, stage))
     assert stages_to_run(config, reader, tmp_path) == left
+
+
+def test_a_run_goes_on_from_before_a_setting_was_there(config, reader, tmp_path):
+    """Settings that a checkpoint does not know have their defaults, or the run is another one."""
+    path = save(config, tmp_path, "detection")
+    saved = torch.load(path, weights_only=True)
+    del saved["most_run"]["training"]["losses"]["yaw"], saved["most"]["parts"]["inference"]["settings"]["fusion"]
+    torch.save(saved, path)
+    config.resume = str(path)
+    assert check_resume(config, reader, tmp_path) == "detection"
+    config.stage.detection.losses.yaw = 2.0
+    with pytest.raises(ConfigError, match=r"training\.losses\.yaw = 1\.0, found 2\.0"):
+        check_resume(config, reader, tmp_path)
+
+
+def test_amodal_extents_are_refused_without_boxes_and_have_a_head_of_their_own(config, reader, tmp_path):
+    config.extent = Amodal()
+    assert isinstance(model_parts(config)["centre_head"], OrientedCentreHead)
+    with pytest.raises(ConfigError, match=r"extent: expected amodal boxes for each sequence of the split train"):
+        stages_to_run(config, reader, tmp_path)
+
+
+def test_extents_of_points_too_few_are_no_targets(config):
+    assert training_of(config, "detection") is config.stage.detection
+    config.extent = DropSmall(min_points=3)
+    assert training_of(config, "detection").targets.min_points == 3
+    assert training_of(config, "membership") is config.stage.membership
+    assert describe_run(config, "detection", FRAMES)["training"]["targets"]["min_points"] == 3
+    assert config.stage.detection.targets.min_points == 1
+
+
+def test_dropping_what_is_dropped_anyway_is_refused(config, reader, tmp_path):
+    config.extent, config.stage.detection.targets.min_points = DropSmall(min_points=3), 3
+    with pytest.raises(ConfigError, match=r"extent\.min_points: expected more than .*min_points = 3, .*, found 3"):
+        stages_to_run(config, reader, tmp_path)
 
 
 def test_a_run_begins_with_its_first_stage(config, reader, tmp_path):
@@ -127,6 +164,57 @@ def test_what_stage_2_cannot_do_is_refused_before_stage_1(config, reader, tmp_pa
         stages_to_run(config, reader, tmp_path)
 
 
+OFFSETS = {"heads": OffsetHeads(OffsetHead(8))}
+
+
+@pytest.mark.parametrize(
+    ("run", "change", "message"),
+    [
+        (["detection", "membership"], OFFSETS, "needs no centres, .* heads are offset_regression, found point_seg_mlp"),
+        (["detection"], {**OFFSETS, "membership": Nearest()}, "found nearest; choose another, or heads=modal_centres"),
+        (["detection"], {"membership": MeanShift()}, "found mean_shift; choose another, or heads=offset_regression"),
+        (["detection", "membership"], {"membership": Clustering()}, "full, found clustering; with it say stage=detect"),
+    ],
+)
+def test_a_membership_that_has_nothing_to_stand_on_is_refused(config, reader, tmp_path, run, change, message):
+    config.stage.run = run
+    for name, value in change.items():
+        setattr(config, name, value)
+    with pytest.raises(ConfigError, match=rf"membership: expected .*{message}"):
+        stages_to_run(config, reader, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "name"),
+    [
+        ({}, "nearest"),
+        (OFFSETS, "mean_shift"),
+        ({**OFFSETS, "membership": Clustering()}, "clustering"),
+        ({"membership": Clustering(link=2.0)}, "clustering"),
+    ],
+)
+def test_stage_1_by_itself_knows_a_membership_without_training(config, reader, tmp_path, change, name):
+    config.stage.run = ["detection"]
+    for key, value in change.items():
+        setattr(config, key, value)
+    assert stages_to_run(config, reader, tmp_path) == ["detection"]
+    assert to_plain("membership", stage1_parts(config)["membership"])["component"] == name
+
+
+def test_settings_that_came_after_a_checkpoint_are_at_their_defaults(config, reader, tmp_path):
+    path = save(config, tmp_path, "detection")
+    content = torch.load(path)
+    del content["most"]["parts"]["backbone"]["settings"]["separate"]
+    torch.save(content, path)
+    config.resume = str(path)
+    assert check_resume(config, reader, tmp_path) == "detection"
+    config.resume, config.stage1, config.stage.run = None, str(path), ["membership"]
+    check_stage1(config, TAXONOMY)
+    config.backbone.separate = True
+    with pytest.raises(ConfigError, match=r"was trained with another backbone: .*'separate': True.*'separate': False"):
+        check_stage1(config, TAXONOMY)
+
+
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
 def test_a_gpu_that_is_not_there_is_refused(config, reader, tmp_path):
     for devices in (1, -1):
@@ -139,6 +227,26 @@ def test_checkpoints_of_another_run_are_not_overwritten(config, reader, tmp_path
     kept = save(config, tmp_path, "detection")
     with pytest.raises(ConfigError, match=rf"expected a folder without checkpoints, found {kept}; .*resume={kept}"):
         stages_to_run(config, reader, tmp_path)
+
+
+def test_weights_to_begin_with_are_those_of_the_same_network(config, reader, tmp_path):
+    config.weights = str(save(config, tmp_path, "detection"))
+    folder = tmp_path / "new"
+    config.dataset.sweeps, config.grid = 5, replace(config.grid, voxel_size=[0.25, 0.25, 0.5])
+    assert stages_to_run(config, reader, folder) == ["detection", "membership"]  # another window, other voxels
+    config.grid = replace(config.grid, upper=[8.0, 8.0, 6.0])
+    with pytest.raises(ConfigError, match="weights: expected a grid of as many layers as this one, 16, found 8"):
+        stages_to_run(config, reader, folder)
+    config.backbone = AsymmetricUNetSmallSettings(widths=[4, 4, 8, 16], bev_channels=8)
+    with pytest.raises(ConfigError, match=r"weights: .* another backbone: expected .*16\].* found .*8\]"):
+        stages_to_run(config, reader, folder)
+
+
+def test_weights_to_begin_with_are_not_for_stage_2(config, reader, tmp_path):
+    config.weights = config.stage1 = str(save(config, tmp_path, "detection"))
+    config.stage.run = ["membership"]
+    with pytest.raises(ConfigError, match="weights: expected none where stage 1 is not trained"):
+        stages_to_run(config, reader, tmp_path / "new")
 
 
 def test_what_a_run_says_of_itself_is_plain(config):

@@ -62,3 +62,26 @@ def test_windows_of_a_batch_are_apart():
 def test_impossible_settings_are_refused(wrong):
     with pytest.raises(ConfigError, match=rf"detector.{next(iter(wrong))}: expected"):
         PeakDetector(**wrong)
+
+
+def turned(*peaks, yaw, size):
+    """Maps with peaks whose boxes have this yaw and these half-sizes."""
+    made = maps(*peaks)
+    made.extent[0] = torch.tensor(size).log()[:, None, None]
+    made.yaw = torch.tensor([math.sin(2 * yaw), math.cos(2 * yaw)])[None, :, None, None].expand(1, 2, 8, 8)
+    return made
+
+
+@pytest.mark.parametrize("yaw", [-1.5, -0.7, 0.0, 0.3, 1.5])
+def test_a_yaw_is_half_the_angle_of_its_sine_and_cosine(yaw):
+    peak = (0, 0, 5, 2, 0.9)
+    for angle in (yaw, yaw + math.pi):  # back to front it is the same box
+        (found,) = PeakDetector()(turned(peak, yaw=angle, size=(2.0, 1.0, 1.0)), [1, 2], GRID)
+        assert found.yaws.tolist() == pytest.approx([yaw], abs=1e-5)
+
+
+def test_what_lies_along_a_turned_box_goes_and_what_lies_beside_it_stays():
+    """Boxes 8 m long and 1 m wide at 45 degrees: two cells aside on one diagonal are inside, on the other outside."""
+    peaks = (0, 0, 3, 3, 0.9), (0, 0, 5, 5, 0.8), (0, 0, 5, 1, 0.7)
+    (found,) = PeakDetector(overlap=1.0)(turned(*peaks, yaw=math.pi / 4, size=(4.0, 0.5, 1.0)), [1, 2], GRID)
+    assert found.scores.tolist() == pytest.approx([0.9, 0.7])

@@ -1,8 +1,10 @@
 """A user's mistake is one message and exit code 2; a mistake of ours keeps its traceback."""
 
 import pytest
+from hydra.core.hydra_config import HydraConfig
+from omegaconf import OmegaConf
 
-from most.entry import run
+from most.entry import refuse_idle, run
 from most.errors import ConfigError, DataError, MostError
 
 
@@ -33,3 +35,24 @@ def test_work_that_ends_well_ends_quietly(capsys):
     run(lambda: done.append(1))
     assert done == [1]
     assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        ("grid=nuscenes", "grid: expected none with it, found grid=nuscenes; leave it out"),
+        ("+grid.voxel_size=[1,1,1]", r"grid.voxel_size: expected none with it, found \+grid"),
+        ("~grid", "grid: expected none with it, found ~grid"),
+    ],
+)
+def test_a_setting_that_cannot_act_is_refused_where_it_was_given(told, said, monkeypatch):
+    hydra = OmegaConf.create({"hydra": {"overrides": {"task": ["out=a.json", told]}}})
+    monkeypatch.setattr(HydraConfig.instance(), "cfg", hydra)
+    refuse_idle(["gri", "outer"], "with it")  # beginnings of names are other names
+    with pytest.raises(ConfigError, match=said):
+        refuse_idle(["grid"], "with it")
+
+
+def test_without_hydra_nothing_was_given(monkeypatch):
+    monkeypatch.setattr(HydraConfig.instance(), "cfg", None)
+    refuse_idle(["grid"], "with it")

@@ -95,3 +95,17 @@ def test_lovasz_without_a_known_item_is_nothing():
     loss.backward()
     assert loss == 0
     assert (logits.grad == 0).all()
+
+
+def test_yaws_count_where_both_maps_and_targets_have_them():
+    """Sine and cosine are off by 0.5 and 1 at one centre, by nothing at the other."""
+    maps = BevMaps(*[torch.zeros(1, channels, 2, 2) for channels in (1, 2, 1, 3, 2)])
+    cells, known = torch.tensor([[0, 0, 1], [0, 1, 1]]), torch.ones(2, dtype=torch.bool)
+    targets = BevTargets(
+        torch.zeros(1, 1, 2, 2), cells, *[torch.zeros(2, channels) for channels in (2, 1, 3, 2)], known
+    )
+    assert "yaw" not in regression_losses(maps, targets)
+    targets.yaw = torch.tensor([[0.5, 1.0], [0.0, 0.0]])
+    assert "yaw" not in regression_losses(maps, targets)
+    maps.yaw = torch.zeros(1, 2, 2, 2)
+    assert regression_losses(maps, targets)["yaw"].item() == pytest.approx(0.75)

@@ -4,6 +4,8 @@ import pytest
 import torch
 
 from most.backbones import AsymmetricUNetSettings, AsymmetricUNetSmallSettings, ResidualUNetSettings
+from most.heads import OffsetHead
+from most.membership import MeanShift
 from most.network import is_current
 from most.voxels import voxelise
 from tiny import GRID, TAXONOMY, cloud, tiny_predictor, window
@@ -12,9 +14,10 @@ BACKBONES = [AsymmetricUNetSettings, AsymmetricUNetSmallSettings, ResidualUNetSe
 CLASSES, THINGS = TAXONOMY.num_classes - 1, len(TAXONOMY.things)
 
 
-def network(settings=AsymmetricUNetSmallSettings):
+def network(settings=AsymmetricUNetSmallSettings, separate=False, **changes):
     """A network whose batch statistics are those of some points, as after training."""
-    made = tiny_predictor(backbone=settings(widths=[4, 4, 8, 8], bev_channels=8)).network
+    backbone = settings(widths=[4, 4, 8, 8], bev_channels=8, separate=separate)
+    made = tiny_predictor(backbone=backbone, **changes).network
     made([window(cloud(300))])
     return made.eval()
 
@@ -55,7 +58,9 @@ def test_windows_of_a_batch_do_not_see_each_other(settings):
     for name in ("voxel_logits", "point_logits", "point_features", "bev"):
         apart = torch.cat([getattr(each, name) for each in alone])
         assert torch.allclose(getattr(together, name), apart, atol=1e-5), name
-    for name, value in vars(together.maps).items():
+    assert together.maps.yaw is None
+    for name in ("heatmap", "offset", "height", "extent", "velocity"):
+        value = getattr(together.maps, name)
         assert torch.allclose(value, torch.cat([getattr(each.maps, name) for each in alone]), atol=1e-5), name
 
 
@@ -74,3 +79,51 @@ def test_a_voxel_reads_the_map_cell_above_it():
     samples = [window(corners), window(corners)]
     assert model.voxel_cells(voxelise(samples, GRID)).tolist() == [0, 3, 12, 16, 19, 28]
     assert model.bev_grid.cell == (4.0, 4.0)
+
+
+OFFSETS = {"centre_head": OffsetHead(8), "membership": MeanShift()}
+
+
+@pytest.mark.parametrize("settings", BACKBONES)
+@pytest.mark.parametrize("changes", [{}, OFFSETS], ids=["centres", "offsets"])
+def test_separate_networks_share_no_weight(settings, changes):
+    model = network(settings, separate=True, **changes).train()
+    weights = dict(model.named_parameters())
+    for_instances = {name for name in weights if name.startswith(("detection.", "centre_head."))}
+    output = model([window(cloud(300)), window(cloud(200, 1))])
+    found = (
+        output.offsets if output.maps is None else torch.cat([each.flatten() for each in vars(output.maps).values()])
+    )
+    for said, mine in ((found, for_instances), (output.point_logits, weights.keys() - for_instances)):
+        model.zero_grad()
+        (said**2).sum().backward(retain_graph=True)
+        assert {name for name, weight in weights.items() if weight.grad is not None} == mine
+
+
+def test_separate_networks_are_of_one_kind_but_for_the_decoder():
+    alone, apart = network().state_dict(), network(separate=True).state_dict()
+    trunk = {name: value.shape for name, value in alone.items() if name.startswith(("encoder.", "backbone."))}
+    other = {name.removeprefix("detection."): value.shape for name, value in apart.items() if "detection." in name}
+    needless = {name for name in trunk if name.startswith(("backbone.up.", "backbone.bev.back."))}
+    assert other == {name: shape for name, shape in trunk.items() if name not in needless}
+    assert {name: value.shape for name, value in apart.items() if "detection." not in name} == {
+        name: value.shape for name, value in alone.items()
+    }
+
+
+def test_separate_windows_of_a_batch_do_not_see_each_other():
+    model = network(separate=True)
+    first, second = window(cloud(60), cloud(20, 1)), window(cloud(50, 2), cloud(30, 3))
+    together, alone = model([first, second]), [model([first]), model([second])]
+    assert torch.allclose(together.bev, torch.cat([each.bev for each in alone]), atol=1e-5)
+    assert torch.allclose(together.maps.heatmap, torch.cat([each.maps.heatmap for each in alone]), atol=1e-5)
+
+
+def test_points_of_a_voxel_vote_for_one_place():
+    here = torch.tensor([[0.1, 0.1, 0.1], [0.4, 0.3, 0.2], [5.1, 0.1, 0.1], [90.0, 0.0, 0.0]])
+    output = network(**OFFSETS)([window(here, cloud(20))])
+    assert output.maps is None
+    votes = here[:3] + output.offsets
+    assert torch.allclose(votes[0], votes[1], atol=1e-6)
+    assert not torch.allclose(votes[0], votes[2], atol=1.0)
+    assert (votes[0] - 0.25).norm() < 0.1  # the first weights say little

@@ -1,6 +1,6 @@
 import torch
 
-from most.membership import Evidence, Nearest, RegionOfInterest
+from most.membership import Evidence, Nearest, Rating, RegionOfInterest
 from most.panoptic import Fusion, cluster, fuse
 from most.structures import Detections
 from most.voxels import BevGrid
@@ -27,7 +27,7 @@ def label(points, semantics, found, membership=None, roi=None, **fusion):
     )
 
 
-class Rated:
+class Rated(Rating):
     """A membership that answers from a table (point, detection) -> confidence."""
 
     def __init__(self, table):

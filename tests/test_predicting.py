@@ -9,15 +9,15 @@ from most.datasets.semantickitti import SemanticKITTI, Splits
 from most.datasets.window_stream import WindowStream
 from most.errors import DataError
 from most.inference import Prediction
+from most.membership import Nearest
 from most.predicting import (
     claim_folder,
     describe_model,
     describe_split,
-    read_prediction,
     unfinished,
-    write_prediction,
     write_predictions,
 )
+from most.predictions import read_prediction, write_prediction
 from most.streaming import PanopticTracker
 from most.structures import Detections, Panoptic
 from most.tracking import TrackerSettings
@@ -60,7 +60,9 @@ def test_what_is_written_is_read_back(reader, tmp_path, prediction):
     again = read_prediction(reader, path)
     for part in ("panoptic", "detections"):
         for name, value in vars(getattr(prediction, part)).items():
-            assert torch.equal(getattr(getattr(again, part), name), value), name
+            read = getattr(getattr(again, part), name)
+            assert (read is None) == (value is None)
+            assert read is None or torch.equal(read, value), name
     assert torch.equal(again.roi, prediction.roi)
     assert torch.equal(again.claimed, prediction.claimed)
 
@@ -119,8 +121,8 @@ def checkpoint(tmp_path):
     return path
 
 
-def claim(out, checkpoint, reader, split, nearest=False, tracker="greedy"):
-    model = describe_model(checkpoint, nearest, TrackerSettings(assignment=tracker))
+def claim(out, checkpoint, reader, split, membership=None, tracker="greedy"):
+    model = describe_model(checkpoint, membership, TrackerSettings(assignment=tracker))
     claim_folder(out, model, describe_split(reader, split))
 
 
@@ -145,7 +147,7 @@ def test_another_checkpoint_split_or_dataset_is_refused(tmp_path, checkpoint, re
         with pytest.raises(DataError, match="tracker or of other scans; choose another out"):
             claim(out, checkpoint, *other)
     with pytest.raises(DataError, match="holds predictions of another checkpoint, membership"):
-        claim(out, checkpoint, reader, "val", nearest=True)
+        claim(out, checkpoint, reader, "val", membership=Nearest())
     with pytest.raises(DataError, match="holds predictions of another checkpoint, membership, tracker"):
         claim(out, checkpoint, reader, "val", tracker="hungarian")
     checkpoint.write_bytes(b"other weights")

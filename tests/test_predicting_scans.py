@@ -1,5 +1,7 @@
 """Scans of any sensor get labels over time, and a run that was interrupted goes on."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -7,6 +9,7 @@ import torch
 from most.assembly import Trained
 from most.datasets.labels import read_labels
 from most.datasets.scan_folder import ScanFolder, ScanFolderSettings
+from most.datasets.taxonomy import LabelCode
 from most.errors import DataError
 from most.metrics.assignments import assignments_path, read_assignments
 from most.predicting_scans import describe_scans, label_scans
@@ -50,11 +53,17 @@ def test_labels_are_those_of_the_stream(model, folder, tmp_path, posed):
         assert step.ids.any()
 
 
+FEW_NUMBERS = replace(TAXONOMY, label=LabelCode("class", step=3, unique_in="class"))  # 1, and 2 for all others
+
+
+@pytest.mark.parametrize("taxonomy", [TAXONOMY, FEW_NUMBERS])
 @pytest.mark.filterwarnings("ignore:.*no pose")
-def test_a_run_that_goes_on_writes_what_it_would_have_written(model, folder, tmp_path):
+def test_a_run_that_goes_on_writes_what_it_would_have_written(taxonomy, folder, tmp_path):
+    model = PanopticTracker(Trained(tiny_predictor(9), taxonomy, 2))
     scans, out = ScanFolder(folder), tmp_path / "out"
     label_scans(model, scans, out)
     whole = labels(out)
+    assert len(model.tracker.tracks().ids.unique()) > 1
     for index in (4, 10, 11):
         (out / f"predictions/scan_{index}.label").unlink()
     label_scans(model, scans, out)
@@ -66,7 +75,9 @@ def test_labels_that_do_not_fit_the_scan_are_refused_by_name(model, folder, tmp_
     scans, out = ScanFolder(folder), tmp_path / "out"
     label_scans(model, scans, out)
     np.save(folder / "scan_3.npy", cloud(299).numpy())
-    with pytest.raises(DataError, match=r"scan_3\.label: expected labels of the scan's 299 points, found 300"):
+    with pytest.raises(
+        DataError, match=r"scan_3\.label: labels: expected a label for each of the scan's 299 points, found 300"
+    ):
         label_scans(model, scans, out)
 
 

@@ -125,14 +125,28 @@ def test_a_faulty_nuscenes_prediction(nuscenes: Reader, refused: Refusal, comman
     assert str(path.relative_to(refused.folder)) in refused(command, *NUSCENES_TOLD)
 
 
-@pytest.mark.parametrize("fault", ["cut within a label", "of no class"])
+@pytest.mark.parametrize("fault", ["cut within a label", "a label short", "empty", "of no class"])
 def test_a_faulty_semantickitti_truth(kitti: Reader, refused: Refusal, fault: str) -> None:
-    predict(kitti, refused.folder / "mine")
-    KITTI_FAULTS[fault](refused.folder / "tree/sequences/08/labels/000001.label")
-    assert "000001.label" in refused("evaluate", *KITTI_TOLD)
+    predicted, truth = predict(kitti, refused.folder / "mine")[1], "tree/sequences/08/labels/000001.label"
+    KITTI_FAULTS[fault](refused.folder / truth)
+    message = refused("evaluate", *KITTI_TOLD)
+    assert ("truth of" if fault == "of no class" else truth) in message
+    assert fault == "of no class" or predicted.parent.name not in message
 
 
-@pytest.mark.parametrize("fault", ["missing", "empty", "cut off", "of another type", "of another shape", "of objects"])
+def test_without_the_scan_neither_of_two_lengths_is_the_wrong_one(kitti: Reader, refused: Refusal) -> None:
+    predicted = predict(kitti, refused.folder / "mine")[1]
+    cut(4)(refused.folder / "tree/sequences/08/labels/000001.label")
+    (refused.folder / "tree/sequences/08/velodyne/000001.bin").unlink()
+    message = refused("evaluate", *KITTI_TOLD)
+    assert f"{predicted.relative_to(refused.folder)}: expected a label for each of the truth's 8 points" in message
+    assert "found 9; one of the two is cut off, or of another scan" in message
+
+
+FAULTS_OF_TRUTH = ["missing", "empty", "cut off", "a label short", "of another type", "of another shape", "of objects"]
+
+
+@pytest.mark.parametrize("fault", FAULTS_OF_TRUTH)
 def test_a_faulty_nuscenes_truth(nuscenes: Reader, refused: Refusal, fault: str) -> None:
     predict(nuscenes, refused.folder / "mine")
     truth = "tree/panoptic/v1.0-trainval/scene-0003-2_panoptic.npz"

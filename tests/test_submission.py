@@ -82,8 +82,8 @@ def test_names_are_those_that_the_servers_expect(tmp_path: Path) -> None:
             if make is nuscenes:
                 meta = json.loads(archive.read("test/submission.json"))["meta"]
                 assert meta == dict.fromkeys(["use_camera", "use_radar", "use_map", "use_external"], False) | {
-                    "use_lidar": True
-                }
+                    "use_lidar": True, "task": "tracking",
+                }  # fmt: skip
 
 
 def test_everything_that_is_wrong_is_listed_and_nothing_is_written(

@@ -135,11 +135,25 @@ def data(make: Callable[[np.ndarray], np.ndarray]) -> Callable[[Files], object]:
     return change
 
 
+def meta(change: Callable[[dict[str, object]], object]) -> Callable[[Files], object]:
+    """Change what the package says of itself."""
+
+    def changed(files: Files) -> None:
+        told = json.loads(files["test/submission.json"])
+        change(told["meta"])
+        files["test/submission.json"] = json.dumps(told).encode()
+
+    return changed
+
+
 @pytest.mark.parametrize(
     "change",
     [
         lambda files: files.pop("test/submission.json"),
-        lambda files: files.update({"test/submission.json": json.dumps({"meta": {"use_lidar": True}}).encode()}),
+        meta(lambda told: told.pop("task")),
+        meta(lambda told: told.update(task="detection")),
+        meta(lambda told: told.pop("use_lidar")),
+        meta(lambda told: told.update(use_map="no")),
         data(lambda labels: labels.astype(np.int32)),
         data(lambda labels: labels[:-1]),
         data(lambda labels: labels * 0),

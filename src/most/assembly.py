@@ -1,26 +1,31 @@
 """Putting the components together, and the checkpoint that takes them apart again."""
 
+import warnings
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import torch
+from torch import nn
 
 from most.config import Config, from_plain, to_plain
 from most.datasets.reader import Frame
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError, DataError
-from most.heads import CentreHead, SemanticHead
+from most.heads import CentreHead, OrientedCentreHead, SemanticHead
 from most.inference import Predictor
-from most.membership import Channels
-from most.network import Network
-from most.panoptic import Membership
+from most.membership import Channels, MeanShift, Membership, Nearest, PointSegMLPSettings
+from most.modal.amodal import Amodal
+from most.modal.extent import DropSmall
+from most.modal.heatmap import HeatmapTargets
+from most.network import Network, Trunk
 from most.voxels import Grid
 
 FORMAT = 3
 KEYS = ("most_run", "state_dict")  # beside "most", which describes the model: what it was trained with, its weights
+STAGE1_RUN = "most_stage1"  # in a checkpoint of stage 2: the ``most_run`` of the stage 1 that it stands on
 GROUPS = ("grid", "encoder", "backbone", "centre_head", "semantic_head", "membership", "inference")
 
 
@@ -29,24 +34,49 @@ def build_network(parts: dict[str, Any], taxonomy: Taxonomy) -> Network:
     grid: Grid = parts["grid"]
     encoder = parts["encoder"].build(grid)
     backbone = parts["backbone"].build(encoder.voxel_channels, grid.shape)
-    centre_head: CentreHead = parts["centre_head"]
-    semantic_head: SemanticHead = parts["semantic_head"]
+    centre_head, semantic_head = parts["centre_head"], cast(SemanticHead, parts["semantic_head"])
+    on_voxels = centre_head.gives == "offsets"
     return Network(
         grid,
         encoder,
         backbone,
-        centre_head.build(backbone.bev_channels, len(taxonomy.things)),
+        centre_head.build(backbone.voxel_channels if on_voxels else backbone.bev_channels, len(taxonomy.things)),
         semantic_head.build(
             taxonomy.num_classes - 1, backbone.voxel_channels, encoder.point_channels, backbone.bev_channels
         ),
+        build_trunk(parts, decoder=on_voxels) if parts["backbone"].separate else None,
     )
 
 
+def build_trunk(parts: dict[str, Any], decoder: bool) -> Trunk:
+    """Make another point encoder and backbone of the same kind, where detection shares none."""
+    encoder = parts["encoder"].build(parts["grid"])
+    return Trunk(encoder, parts["backbone"].build(encoder.voxel_channels, parts["grid"].shape, decoder))
+
+
 def build_membership(parts: dict[str, Any], network: Network, taxonomy: Taxonomy) -> Membership:
-    """Make the membership that goes with a network."""
-    point, bev = network.encoder.point_channels, network.backbone.bev_channels
-    made: Membership = parts["membership"].build(Channels(taxonomy.num_classes - 1, list(taxonomy.things), point, bev))
+    """Make the membership that goes with a network; one that needs what the network does not give is a ConfigError."""
+    check_membership(parts)
+    channels = Channels(
+        classes=taxonomy.num_classes - 1,
+        things=list(taxonomy.things),
+        point=network.encoder.point_channels,
+        bev=network.backbone.bev_channels,
+        boxes=[taxonomy.boxes[thing] for thing in taxonomy.things],
+    )
+    made: Membership = parts["membership"].build(channels)
     return made
+
+
+def check_membership(parts: dict[str, Any]) -> None:
+    """Refuse a membership of detected centres where offsets are regressed, and the other way round."""
+    needs, gives = parts["membership"].needs, parts["centre_head"].gives
+    if needs not in (None, gives):
+        heads = {"centres": "modal_centres", "offsets": "offset_regression"}
+        raise ConfigError(
+            f"membership: expected one that needs no {needs}, as the model's heads are {heads[gives]}, found "
+            f"{to_plain('membership', parts['membership'])['component']}; choose another, or heads={heads[needs]}"
+        )
 
 
 def build_predictor(network: Network, parts: dict[str, Any], taxonomy: Taxonomy) -> Predictor:
@@ -56,16 +86,25 @@ def build_predictor(network: Network, parts: dict[str, Any], taxonomy: Taxonomy)
 
 
 def model_parts(config: Config) -> dict[str, Any]:
-    """Pick what a trained model consists of out of a training's configuration."""
+    """Pick what a trained model consists of out of a training's configuration; amodal boxes have a yaw."""
+    centre = config.heads.centre
+    turned = isinstance(config.extent, Amodal) and isinstance(centre, CentreHead)
     return {
         "grid": config.grid,
         "encoder": config.encoder,
         "backbone": config.backbone,
-        "centre_head": config.heads.centre,
+        "centre_head": OrientedCentreHead(**vars(centre)) if turned else centre,
         "semantic_head": config.heads.semantic,
         "membership": config.membership,
         "inference": config.inference,
     }
+
+
+def stage1_parts(config: Config) -> dict[str, Any]:
+    """Pick what stage 1 consists of; the nearest centre, or mean shift, stands in for what stage 2 is to train."""
+    parts = model_parts(config)
+    stand_in = Nearest() if parts["centre_head"].gives == "centres" else MeanShift()
+    return parts | ({"membership": stand_in} if isinstance(parts["membership"], PointSegMLPSettings) else {})
 
 
 def describe(parts: dict[str, Any], taxonomy: Taxonomy, sweeps: int) -> dict[str, Any]:
@@ -85,14 +124,23 @@ def describe_run(config: Config, stage: str, frames: Sequence[Frame]) -> dict[st
     """
     return {
         "stage": stage,
-        "training": asdict(getattr(config.stage, stage)),
+        "training": asdict(training_of(config, stage)),
         "augment": asdict(config.augment),
         "extent": to_plain("extent", config.extent),
         "scans": dict(Counter(frame.sequence for frame in frames)),
         "seed": config.seed,
         "batch_size": config.dataset.batch_size,
         "processes": config.trainer.processes(),
+        "weights": config.weights,
     }
+
+
+def training_of(config: Config, stage: str) -> Any:
+    """Return a stage's settings, the heat maps' with what the extent strategy drops."""
+    settings = getattr(config.stage, stage)
+    if stage != "detection" or not isinstance(config.extent, DropSmall):
+        return settings
+    return replace(settings, targets=replace(settings.targets, min_points=config.extent.min_points))
 
 
 def describe_taxonomy(taxonomy: Taxonomy) -> dict[str, Any]:
@@ -113,13 +161,22 @@ class Trained:
     predictor: Predictor
     taxonomy: Taxonomy
     sweeps: int  # previous sweeps in its window
+    parts: dict[str, Any] = field(default_factory=dict)  # the components it is made of, as named in ``GROUPS``
+    stage1: dict[str, Any] = field(default_factory=dict)  # what ``describe_run`` said of stage 1; empty: not known
+    targets: HeatmapTargets | None = None  # how the heat maps that it learned from were drawn; None: not known
+
+    def likely_targets(self) -> HeatmapTargets:
+        """Return how its heat maps were drawn; the default, with a warning, where the checkpoint does not say."""
+        if self.targets is None:
+            warnings.warn("the checkpoint does not say how heat maps were drawn: the default is taken", stacklevel=2)
+        return self.targets or HeatmapTargets()
 
 
 def load_trained(path: Path) -> Trained:
     """Read a checkpoint; a file that is none, of another version or of another taxonomy, is a DataError."""
     checkpoint = read_checkpoint(path)
     try:
-        return _assemble(checkpoint["most"], checkpoint["state_dict"])
+        return _assemble(checkpoint["most"], checkpoint["state_dict"], stage1_run(checkpoint))
     except (ConfigError, KeyError, TypeError, AttributeError, RuntimeError) as error:
         raise DataError(
             f"{path}: expected a model that this version of most can make, found another ({error}); "
@@ -127,7 +184,13 @@ def load_trained(path: Path) -> Trained:
         ) from error
 
 
-def _assemble(description: dict[str, Any], state: dict[str, Any]) -> Trained:
+def stage1_run(checkpoint: dict[str, Any]) -> dict[str, Any]:
+    """Return what stage 1 of a checkpoint was trained with; nothing where one of stage 2 does not say."""
+    run: dict[str, Any] = checkpoint["most_run"]
+    return run if run.get("stage") == "detection" else checkpoint.get(STAGE1_RUN, {})
+
+
+def _assemble(description: dict[str, Any], state: dict[str, Any], stage1: dict[str, Any]) -> Trained:
     """Make the model that ``describe`` described, and load its weights."""
     taxonomy = Taxonomy.load(description["taxonomy"]["name"])
     if describe_taxonomy(taxonomy) != description["taxonomy"]:
@@ -135,10 +198,27 @@ def _assemble(description: dict[str, Any], state: dict[str, Any]) -> Trained:
     parts = {group: from_plain(group, description["parts"][group]) for group in GROUPS}
     predictor = build_predictor(build_network(parts, taxonomy), parts, taxonomy)
     for name, module in predictor.modules().items():
-        prefix = f"{name}."
-        module.load_state_dict({key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)})
+        load_weights(module, name, state)
         module.eval()
-    return Trained(predictor, taxonomy, description["sweeps"])
+    drawn = stage1.get("training", {}).get("targets")
+    targets = None if drawn is None else HeatmapTargets(**drawn)
+    return Trained(predictor, taxonomy, description["sweeps"], parts, stage1, targets)
+
+
+def load_weights(module: nn.Module, name: str, state: dict[str, Any]) -> None:
+    """Give a part of a model the weights that a checkpoint's ``state_dict`` has under its name."""
+    prefix = f"{name}."
+    module.load_state_dict({key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)})
+
+
+def exchange_membership(trained: Trained, membership: Any) -> Trained:
+    """Return the model with another membership; one with weights of its own would not be trained: a ConfigError."""
+    if isinstance(membership, PointSegMLPSettings):
+        raise ConfigError("membership: expected one without training, such as nearest, found one that stage 2 trains")
+    predictor = trained.predictor
+    parts = trained.parts | {"membership": membership}
+    made = build_membership(parts, predictor.network, trained.taxonomy)
+    return replace(trained, predictor=replace(predictor, membership=made), parts=parts)
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:

@@ -1,20 +1,26 @@
 """What a training is asked to do, held against what there is, before any work."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import torch
 
-from most.assembly import describe, describe_run, model_parts, read_checkpoint
-from most.config import Config
+from most.assembly import check_membership, describe, describe_run, model_parts, read_checkpoint, stage1_parts
+from most.config import Config, from_plain, from_settings, to_plain
+from most.datasets.augment import Augment
+from most.datasets.instances import check_extent
 from most.datasets.reader import Reader
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError
-from most.membership import Nearest, PointSegMLPSettings
+from most.membership import PointSegMLPSettings
+from most.modal.extent import DropSmall
 from most.stages.trainer import TrainerSettings
-from most.training import batches_per_step
+from most.training import batches_per_step, stage1_file
+from most.voxels import Grid
 
-STAGE1 = ("grid", "encoder", "backbone", "centre_head", "semantic_head")
+NETWORK = ("encoder", "backbone", "centre_head", "semantic_head")
+STAGE1 = ("grid", *NETWORK)
 
 
 def stages_to_run(config: Config, reader: Reader, folder: Path) -> list[str]:
@@ -28,17 +34,32 @@ def stages_to_run(config: Config, reader: Reader, folder: Path) -> list[str]:
                 f"trainer.devices: expected at most as many processes as split {split} has scans, {scans}, "
                 f"found {config.trainer.processes()}"
             )
+        check_extent(config.extent, reader, split)
     for name in names:
         batches_per_step(config, name)
+    check_dropped(config)
     if "membership" in names and not isinstance(config.membership, PointSegMLPSettings):
         raise ConfigError(
-            "membership: expected one that stage 2 can train, such as full, found nearest; with it say stage=detection"
+            "membership: expected one that stage 2 can train, such as full, found "
+            f"{to_plain('membership', config.membership)['component']}; with it say stage=detection"
         )
+    check_membership(model_parts(config) if "membership" in names else stage1_parts(config))
     if config.resume:
         return names[names.index(check_resume(config, reader, folder)) :]
     check_folder(folder)
     check_stage1(config, reader.taxonomy)
+    check_weights(config, reader.taxonomy)
     return names
+
+
+def check_dropped(config: Config) -> None:
+    """Refuse to drop no instance that is not dropped anyway: that would be another strategy's figures."""
+    already = config.stage.detection.targets.min_points
+    if isinstance(config.extent, DropSmall) and config.extent.min_points <= already:
+        raise ConfigError(
+            f"extent.min_points: expected more than stage.detection.targets.min_points = {already}, which leaves out "
+            f"what has fewer points under every strategy, found {config.extent.min_points}; raise it, or lower that"
+        )
 
 
 def check_devices(trainer: TrainerSettings) -> None:
@@ -71,13 +92,13 @@ def check_resume(config: Config, reader: Reader, folder: Path) -> str:
     stage: str = saved["most_run"]["stage"]
     if stage not in config.stage.run:
         raise ConfigError(f"resume: {path} is of stage {stage}; expected one of {', '.join(config.stage.run)}")
-    parts = model_parts(config) | ({"membership": Nearest()} if stage == "detection" else {})
+    parts = stage1_parts(config) if stage == "detection" else model_parts(config)
     expected = {
         "most": describe(parts, reader.taxonomy, config.dataset.sweeps),
         "most_run": describe_run(config, stage, reader.frames("train")),
     }
     for part, now in expected.items():
-        began, goes_on = _flat(saved[part]), _flat(now)
+        began, goes_on = flat(_completed(saved[part], config)), flat(now)
         for key in goes_on | began:
             if began.get(key) != goes_on.get(key):
                 raise ConfigError(
@@ -100,21 +121,63 @@ def check_stage1(config: Config, taxonomy: Taxonomy) -> None:
         raise ConfigError(
             "stage1: expected a checkpoint of stage 1, found none; say stage1=FILE, or train it: stage=both"
         )
-    path = Path(config.stage1)
+    _check_same(config, taxonomy, "stage1", ("taxonomy", "sweeps"), STAGE1)
+
+
+def check_weights(config: Config, taxonomy: Taxonomy) -> None:
+    """Refuse to begin with another network, or a network of other classes; its window and voxels may be others."""
+    if config.weights is None:
+        return
+    if "detection" not in config.stage.run:
+        raise ConfigError("weights: expected none where stage 1 is not trained; say stage=detection or stage=both")
+    saved = _check_same(config, taxonomy, "weights", ("taxonomy",), NETWORK)
+    trained: Grid = from_plain("grid", saved["parts"]["grid"])
+    if trained.shape[2] != config.grid.shape[2]:
+        raise ConfigError(
+            f"weights: expected a grid of as many layers as this one, {config.grid.shape[2]}, "
+            f"found {trained.shape[2]} in {config.weights}; choose another grid"
+        )
+
+
+def _check_same(
+    config: Config, taxonomy: Taxonomy, key: str, told: tuple[str, ...], parts: tuple[str, ...]
+) -> dict[str, Any]:
+    """Return what the checkpoint under ``key`` says of its model; another than the configuration's is a ConfigError.
+
+    ``told`` names what it says of itself that has to agree, ``parts`` the components that have to.
+    """
+    path = stage1_file(config, Path(getattr(config, key)))
     saved, expected = read_checkpoint(path)["most"], describe(model_parts(config), taxonomy, config.dataset.sweeps)
-    pairs = {name: (expected[name], saved[name]) for name in ("taxonomy", "sweeps")}
-    pairs |= {name: (expected["parts"][name], saved["parts"][name]) for name in STAGE1}
+    pairs = {name: (expected[name], saved[name]) for name in told}
+    pairs |= {name: (expected["parts"][name], _completed_part(name, saved["parts"][name])) for name in parts}
     for name, (wanted, found) in pairs.items():
         if wanted != found:
             raise ConfigError(
-                f"stage1: {path} was trained with another {name}: expected {wanted}, found {found}; "
-                "repeat the settings that stage 1 was trained with"
+                f"{key}: {path} was trained with another {name}: expected {wanted}, found {found}; "
+                "repeat the settings that it was trained with"
             )
+    return saved
 
 
-def _flat(settings: dict[str, Any], before: str = "") -> dict[str, Any]:
-    """Nested settings by dotted names."""
-    flat: dict[str, Any] = {}
+def _completed(saved: dict[str, Any], config: Config) -> dict[str, Any]:
+    """What a checkpoint says of its model or its run; settings that were added since have their defaults."""
+    if "parts" in saved:
+        return saved | {"parts": {group: _completed_part(group, part) for group, part in saved["parts"].items()}}
+    training = type(getattr(config.stage, saved["stage"]))
+    return saved | {
+        "training": asdict(from_settings(training, "training", saved["training"])),
+        "augment": asdict(from_settings(Augment, "augment", saved["augment"])),
+        "extent": _completed_part("extent", saved["extent"]),
+    }
+
+
+def _completed_part(group: str, part: dict[str, Any]) -> dict[str, Any]:
+    return to_plain(group, from_plain(group, part))
+
+
+def flat(settings: dict[str, Any], before: str = "") -> dict[str, Any]:
+    """Return nested settings by dotted names."""
+    leaves: dict[str, Any] = {}
     for key, value in settings.items():
-        flat |= _flat(value, f"{before}{key}.") if isinstance(value, dict) else {f"{before}{key}": value}
-    return flat
+        leaves |= flat(value, f"{before}{key}.") if isinstance(value, dict) else {f"{before}{key}": value}
+    return leaves

@@ -20,20 +20,45 @@ from most.datasets.nuscenes import NuScenesSettings
 from most.datasets.semantickitti import SemanticKITTISettings
 from most.encoder import PointEncoder
 from most.errors import ConfigError
-from most.heads import CentreHead, SemanticHead
+from most.heads import CentreHead, OffsetHead, OrientedCentreHead, SemanticHead
 from most.inference import Inference
 from most.logs import LoggerSettings
-from most.membership import Nearest, PointSegMLPSettings
-from most.modal.extent import ShrinkWrap, TrackMax
+from most.membership import Clustering, MeanShift, Nearest, PointSegMLPSettings
+from most.modal.amodal import Amodal
+from most.modal.class_mean import ClassMean
+from most.modal.extent import DropSmall, ShrinkWrap, TrackMax
 from most.stages.settings import StageSettings
 from most.stages.trainer import TrainerSettings
 from most.tracking import TrackerSettings
 from most.voxels import Grid
 
+
+@dataclass
+class Heads:
+    """What reads the backbone's features: modal centres are detected."""
+
+    centre: CentreHead = field(default_factory=CentreHead)
+    semantic: SemanticHead = field(default_factory=SemanticHead)
+
+
+@dataclass
+class OffsetHeads:
+    """What reads the backbone's features: offsets to modal centres are regressed (DS-Net, Table I)."""
+
+    centre: OffsetHead = field(default_factory=OffsetHead)
+    semantic: SemanticHead = field(default_factory=SemanticHead)
+
+
 COMPONENTS: dict[str, dict[str, type]] = {
     "dataset": {"semantickitti": SemanticKITTISettings, "nuscenes": NuScenesSettings},
     "augment": {"augment": Augment},
-    "extent": {"shrink_wrap": ShrinkWrap, "track_max": TrackMax},
+    "extent": {
+        "shrink_wrap": ShrinkWrap,
+        "drop_small": DropSmall,
+        "class_mean": ClassMean,
+        "track_max": TrackMax,
+        "amodal": Amodal,
+    },
     "grid": {"grid": Grid},
     "encoder": {"encoder": PointEncoder},
     "backbone": {
@@ -41,23 +66,25 @@ COMPONENTS: dict[str, dict[str, type]] = {
         "asymmetric_unet_small": AsymmetricUNetSmallSettings,
         "residual_unet": ResidualUNetSettings,
     },
-    "membership": {"nearest": Nearest, "point_seg_mlp": PointSegMLPSettings},
+    "heads": {"modal_centres": Heads, "offset_regression": OffsetHeads},
+    "membership": {
+        "nearest": Nearest,
+        "point_seg_mlp": PointSegMLPSettings,
+        "clustering": Clustering,
+        "mean_shift": MeanShift,
+    },
     "stage": {"stage": StageSettings},
     "trainer": {"trainer": TrainerSettings},
     "logger": {"logger": LoggerSettings},
-    "centre_head": {"centre_head": CentreHead},
+    "centre_head": {
+        "centre_head": CentreHead,
+        "oriented_centre_head": OrientedCentreHead,
+        "offset_head": OffsetHead,
+    },
     "semantic_head": {"semantic_head": SemanticHead},
     "inference": {"inference": Inference},
     "tracker": {"tracker": TrackerSettings},
 }
-
-
-@dataclass
-class Heads:
-    """What reads the backbone's features."""
-
-    centre: CentreHead = field(default_factory=CentreHead)
-    semantic: SemanticHead = field(default_factory=SemanticHead)
 
 
 @dataclass
@@ -75,13 +102,14 @@ class Config:
     seed: int = 1
     resume: str | None = None  # a checkpoint to go on from
     stage1: str | None = None  # the trained stage 1 for stage=membership
+    weights: str | None = None  # a checkpoint whose network stage 1 begins with, of other scans or simulated ones
     dataset: Any = None
     augment: Any = None
     extent: Any = None
     grid: Any = None
     encoder: Any = None
     backbone: Any = None
-    heads: Heads = field(default_factory=Heads)
+    heads: Any = None
     membership: Any = None
     inference: Inference = field(default_factory=Inference)
     stage: Any = None
@@ -134,8 +162,13 @@ def from_plain(group: str, plain: Mapping[str, Any]) -> Any:
     if schema is None:
         known = ", ".join(COMPONENTS[group])
         raise ConfigError(f"{group}: expected one of {known}, found {plain['component']} (of a later version?)")
+    return from_settings(schema, group, plain["settings"])
+
+
+def from_settings(schema: type, name: str, settings: Mapping[str, Any]) -> Any:
+    """Make settings of the plain types they were kept in; a field that was added since has its default."""
     try:
-        merged = OmegaConf.merge(OmegaConf.structured(schema), plain["settings"])
+        merged = OmegaConf.merge(OmegaConf.structured(schema), settings)
     except OmegaConfBaseException as error:
-        raise ConfigError(f"{group}.{error.full_key}: {error}") from error
+        raise ConfigError(f"{name}.{error.full_key}: {error}") from error
     return typed(merged)

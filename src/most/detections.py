@@ -8,6 +8,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from most.errors import ConfigError
+from most.geometry.boxes import along
 from most.structures import BevMaps, Detections
 from most.voxels import BevGrid
 
@@ -50,7 +51,7 @@ class PeakDetector:
 
     def _kept(self, found: Detections) -> Bool[Tensor, "detections"]:
         """Greedily drop each centre that lies inside a more confident one of its class (boxes seen from above)."""
-        distance = (found.centres[:, None, :2] - found.centres[None, :, :2]).abs()
+        distance = along(found.centres[:, None] - found.centres[None], found.yaws)[..., :2].abs()
         reach = self.overlap * torch.maximum(found.extents[:, None, :2], found.extents[None, :, :2])
         covers = (distance < reach).all(2) & (found.classes[:, None] == found.classes[None])
         covered_by = covers.cpu().tril(-1)
@@ -62,16 +63,21 @@ class PeakDetector:
 
 def _window(maps: BevMaps, index: int) -> BevMaps:
     """Return one window's maps, with a batch of one."""
-    return BevMaps(**{name: value[index : index + 1].detach() for name, value in vars(maps).items()})
+    own = {name: value[index : index + 1].detach() for name, value in vars(maps).items() if value is not None}
+    return BevMaps(**own)
 
 
 def decode(
     maps: BevMaps, x: Int64[Tensor, "cells"], y: Int64[Tensor, "cells"], grid: BevGrid
-) -> tuple[Float[Tensor, "cells 3"], Float[Tensor, "cells 3"], Float[Tensor, "cells 2"]]:
-    """Read centres (m), half-sizes (m) and velocities (m/s) off one window's maps at some cells."""
+) -> tuple[Float[Tensor, "cells 3"], Float[Tensor, "cells 3"], Float[Tensor, "cells 2"], Float[Tensor, "cells"] | None]:
+    """Read centres (m), half-sizes (m), velocities (m/s) and yaws (radians) off one window's maps at some cells.
+
+    Yaws lie in (-pi/2, pi/2]: half a turn makes the same box. There are none where the maps have none.
+    """
     offset, height, extent, velocity = (
         values[0, :, x, y].T.float() for values in (maps.offset, maps.height, maps.extent, maps.velocity)
     )
     cells = torch.stack([x, y], 1) + 0.5 + offset
     ground = cells * offset.new_tensor(grid.cell) + offset.new_tensor(grid.lower)
-    return torch.cat([ground, height], 1), extent.clamp(-4.0, 4.0).exp(), velocity
+    yaws = None if maps.yaw is None else torch.atan2(*maps.yaw[0, :, x, y].float()) / 2
+    return torch.cat([ground, height], 1), extent.clamp(-4.0, 4.0).exp(), velocity, yaws

@@ -15,7 +15,7 @@ from most.entry import run, start
 from most.geometry.similarity import Similarity
 from most.modal.build import LabelRules, build_table
 from most.modal.extent import ShrinkWrap
-from most.predicting import read_prediction
+from most.predictions import read_prediction
 from most.structures import Instances
 from most.viz.bev import save
 from most.viz.callback import draw_prediction

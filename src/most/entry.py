@@ -3,13 +3,18 @@
 import errno
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
+from typing import NoReturn
 
+from hydra.core.hydra_config import HydraConfig
+from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.errors import HydraException
-from omegaconf.errors import OmegaConfBaseException
+from omegaconf import DictConfig
+from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBaseException
 
-from most.errors import MostError
+from most.errors import ConfigError, MostError
 
+KEY_ERRORS = (ConfigAttributeError, ConfigKeyError)
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 NO_RIGHT = (errno.EROFS, errno.EACCES, errno.EPERM)
 NO_PLACE = (errno.EISDIR, errno.ENOTDIR, errno.EEXIST)  # a folder where a file is to be, or a file on the way
@@ -24,23 +29,44 @@ def start(main: Callable[[], None]) -> None:
     try:
         run(main)
     except (HydraException, OmegaConfBaseException) as error:
-        said = [line for line in str(error).splitlines() if not line.startswith("To append")]  # no key may be added
-        cause = str(error.__cause__).splitlines()[:1] if error.__cause__ else []
-        _end("\n".join([*said, *cause]), 2)
+        said = str(error).split("Config search path:")[0].splitlines()  # of use to developers alone
+        kept = [line for line in said if not line.startswith("To append") and not line.endswith("_schema")]
+        end("\n".join([*kept, *_cause(error)]), 2)
 
 
-def run(task: Callable[[], None]) -> None:
+def _cause(error: Exception) -> list[str]:
+    """Say why a configuration did not compose; where a key does not exist, which ones do."""
+    cause = error.__cause__
+    parent = getattr(cause, "parent_node", None)
+    keys = sorted(map(str, parent)) if isinstance(cause, KEY_ERRORS) and isinstance(parent, DictConfig) else []
+    known = [f"expected one of {', '.join(keys)}"] if keys else []
+    return [*str(cause).splitlines()[:1], *known] if cause else known
+
+
+def run(task: Callable[[], object]) -> None:
     """Run a command's work."""
     try:
         task()
     except MostError as error:
-        _end(_message(error), error.exit_code)
+        end(_message(error), error.exit_code)
     except OSError as error:
         advice = {**dict.fromkeys(NO_ROOM, "make room"), **dict.fromkeys(NO_RIGHT + NO_PLACE, "choose another place")}
         if error.errno not in advice:
             raise
         place = error.filename or "an output file"
-        _end(f"{place}: expected to read or write it, found {error.strerror}; {advice[error.errno]}", 2)
+        end(f"{place}: expected to read or write it, found {error.strerror}; {advice[error.errno]}", 2)
+
+
+def refuse_idle(keys: Collection[str], why: str) -> None:
+    """Refuse settings under these keys that the user gave, though they cannot act; defaults are no mistake.
+
+    ``why`` goes on the sentence "expected none". Without Hydra nothing was given.
+    """
+    told = HydraConfig.get().overrides.task if HydraConfig.initialized() else []
+    for override in OverridesParser.create().parse_overrides(list(told)):
+        key = override.key_or_group
+        if any(key == idle or key.startswith(f"{idle}.") for idle in keys):
+            raise ConfigError(f"{key}: expected none {why}, found {override.input_line}; leave it out")
 
 
 def _message(error: MostError) -> str:
@@ -49,6 +75,7 @@ def _message(error: MostError) -> str:
     return text.rsplit(f"{name}: ", 1)[1].strip() if "Original Traceback" in text else text
 
 
-def _end(message: str, code: int) -> None:
+def end(message: str, code: int) -> NoReturn:
+    """Say what is wrong, and end this process."""
     print(f"most: {message}", file=sys.stderr)
     sys.exit(code)

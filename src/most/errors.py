@@ -27,6 +27,12 @@ class StoppedError(MostError):
         self.exit_code = exit_code
 
 
+class FailedError(MostError):
+    """Jobs of a sweep failed; the message says which, and why."""
+
+    exit_code = 1
+
+
 @contextmanager
 def named(place: object) -> Iterator[None]:
     """Say in a DataError of the work within where it happened."""
@@ -34,3 +40,12 @@ def named(place: object) -> Iterator[None]:
         yield
     except DataError as error:
         raise DataError(f"{place}: {error}") from error
+
+
+def check_entries(file: object, entries: int, points: int, what: str = "a label", whose: str = "scan") -> None:
+    """Refuse a file unless it has as many entries (labels, by default) as its scan has points."""
+    if entries != points:
+        raise DataError(
+            f"{file}: expected {what} for each of the {whose}'s {points} points, found {entries}; one of the two is "
+            "cut off, or of another scan or release: copy it again, or predict the scan again"
+        )

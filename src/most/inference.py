@@ -8,9 +8,9 @@ from jaxtyping import Float, Int64
 from torch import Tensor, nn
 
 from most.detections import PeakDetector
-from most.membership import Evidence, RegionOfInterest
+from most.membership import Evidence, Membership, RegionOfInterest
 from most.network import Network, NetworkOutput
-from most.panoptic import Fusion, Membership, fuse
+from most.panoptic import Fusion, fuse
 from most.structures import Detections, OnDevice, Panoptic, Sample
 from most.voxels import Grid, nearest_voxel
 
@@ -59,7 +59,7 @@ class Predictor:
 
     def read(self, output: NetworkOutput, samples: list[Sample]) -> list[Evidence]:
         """Return the same from what the network said of the samples."""
-        found = self.settings.detector(output.maps, self.things, self.network.bev_grid)
+        found = self._detect(output, samples)
         classified = classify(output, samples, self.network.grid, self.fallback)
         return [
             Evidence(
@@ -70,15 +70,22 @@ class Predictor:
                 bev=bev,
                 bev_grid=self.network.bev_grid,
                 detections=detections,
+                offsets=seen.offsets,
             )
             for sample, seen, bev, detections in zip(samples, classified, output.bev, found, strict=True)
         ]
 
+    def _detect(self, output: NetworkOutput, samples: list[Sample]) -> list[Detections]:
+        """Return the peaks of each window's maps; nothing is detected where there are none."""
+        if output.maps is None:
+            return [Detections.none(sample.points) for sample in samples]
+        return self.settings.detector(output.maps, self.things, self.network.bev_grid)
+
     def fuse(self, evidence: Evidence) -> Prediction:
         """Return the labels of one sweep."""
-        roi, detections = self.settings.roi, evidence.detections
-        assignment = fuse(evidence, self.things, self.membership, roi, self.settings.fusion)
-        return Prediction(assignment.panoptic, detections, roi.half_sizes(detections.extents), assignment.claimed)
+        roi = self.settings.roi
+        found = fuse(evidence, self.things, self.membership, roi, self.settings.fusion)
+        return Prediction(found.panoptic, found.detections, roi.half_sizes(found.detections.extents), found.claimed)
 
 
 @dataclass
@@ -88,6 +95,7 @@ class Classified:
     semantics: Int64[Tensor, "current"]
     probabilities: Float[Tensor, "current classes"]
     point_features: Float[Tensor, "current point_channels"]
+    offsets: Float[Tensor, "current 3"] | None
 
 
 def classify(output: NetworkOutput, samples: list[Sample], grid: Grid, fallback: int) -> list[Classified]:
@@ -112,6 +120,9 @@ def classify(output: NetworkOutput, samples: list[Sample], grid: Grid, fallback:
         probabilities[inside] = output.point_logits[rows].float().softmax(1)
         features = output.point_features.new_zeros(len(semantics), output.point_features.shape[1])
         features[inside] = output.point_features[output.current[rows]]
-        results.append(Classified(semantics, probabilities, features))
+        offsets = None
+        if output.offsets is not None:
+            offsets = output.offsets.new_zeros(len(semantics), 3).index_copy(0, inside, output.offsets[rows].detach())
+        results.append(Classified(semantics, probabilities, features, offsets))
         start += len(sample.points)
     return results

@@ -1,11 +1,14 @@
-"""Lightning loggers: W&B (offline unless asked), CSV, or none."""
+"""Lightning loggers: W&B (offline unless asked), CSV, or none; and the files of a finished run as W&B artifacts."""
 
 import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import wandb
 from lightning.pytorch.loggers import CSVLogger, Logger, WandbLogger
+from lightning.pytorch.utilities import rank_zero_only
 
 from most.errors import ConfigError
 
@@ -39,3 +42,15 @@ class LoggerSettings:
         online = self.mode == "online" and "WANDB_API_KEY" in os.environ
         os.environ["WANDB_MODE"] = "online" if online else "offline"  # WandbLogger's own switch refuses log_model
         return WandbLogger(name=name, save_dir=folder, project=self.project, group=self.group, config=config)
+
+
+@rank_zero_only
+def log_artifacts(logger: Logger | bool, files: Mapping[str, Sequence[Path]]) -> None:
+    """Tell W&B of a run's files, by kind; those that are not there are left out. Offline they stay where they are."""
+    if not isinstance(logger, WandbLogger):
+        return
+    for kind, paths in files.items():
+        artifact = wandb.Artifact(f"{kind}-{logger.experiment.id}", kind)
+        for path in filter(Path.is_file, paths):
+            artifact.add_file(str(path), policy="immutable")  # a reference: checkpoints are large
+        logger.experiment.log_artifact(artifact)

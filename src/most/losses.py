@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Float, Int64
+from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -26,6 +26,7 @@ class LossWeights:
     height: float = 1.0
     extent: float = 1.0
     velocity: float = 1.0
+    yaw: float = 1.0  # of amodal boxes alone
     lovasz: float = 0.0  # on voxels; not the paper's
     class_balance: float = 0.0  # cross-entropy weights are (class frequency) ** -class_balance
 
@@ -81,12 +82,24 @@ def focal_loss(
     return mean_over_all(-torch.where(centre, missed, invented).sum(), centre.sum())
 
 
+def offset_loss(
+    offsets: Float[Tensor, "points 3"], targets: Float[Tensor, "points 3"], known: Bool[Tensor, "points"]
+) -> Float[Tensor, ""]:
+    """L1 of the offsets to modal centres (DS-Net), averaged over the points whose instance is known."""
+    return mean_over_all((offsets - targets)[known].float().abs().sum(), known.sum())
+
+
 def regression_losses(maps: BevMaps, targets: BevTargets) -> dict[str, Float[Tensor, ""]]:
-    """L1 at the centre cells, averaged over instances (Eq. 2 and 4); unknown velocities do not count."""
+    """L1 at the centre cells, averaged over instances (Eq. 2 and 4); unknown velocities do not count.
+
+    ``yaw`` is among them where both maps and targets have one.
+    """
     batch, x, y = targets.cells.unbind(1)
     known = targets.velocity_known[:, None].float()
     count = torch.tensor(len(batch), device=batch.device)
-    at_centres = {name: getattr(maps, name)[batch, :, x, y].float() for name in ("offset", "height", "extent")}
+    names = ["offset", "height", "extent"]
+    names += ["yaw"] if maps.yaw is not None and targets.yaw is not None else []
+    at_centres = {name: getattr(maps, name)[batch, :, x, y].float() for name in names}
     errors = {name: (value - getattr(targets, name)).abs().sum() for name, value in at_centres.items()}
     losses = {name: mean_over_all(error, count) for name, error in errors.items()}
     error = (maps.velocity[batch, :, x, y].float() - targets.velocity).abs() * known

@@ -10,9 +10,10 @@ from omegaconf import DictConfig
 
 from most.assembly import check_taxonomy, load_trained
 from most.config import conf_dir, register, store_root, typed
-from most.datasets.instances import InstanceTables
+from most.datasets.instances import InstanceTables, check_extent
 from most.datasets.taxonomy import Taxonomy
-from most.entry import run, start
+from most.device import chosen_device
+from most.entry import refuse_idle, run, start
 from most.inference import Inference
 from most.ladder import Ladder, Look, ModelLook, NoModel, check_labels, climb, format_ladder
 from most.metrics.report import write_report
@@ -30,6 +31,10 @@ class OracleConfig:
     tracker: Any = None
     grid: Any = None  # of the voxels; a checkpoint has its own
     inference: Inference = field(default_factory=Inference)  # a checkpoint has its own
+    device: str = "auto"  # auto: a GPU where there is one
+
+    def __post_init__(self) -> None:
+        chosen_device(self.device)
 
 
 register()
@@ -44,15 +49,18 @@ def look_of(config: OracleConfig, taxonomy: Taxonomy, device: torch.device) -> t
     check_taxonomy(trained.taxonomy, taxonomy)
     for module in trained.predictor.modules().values():
         module.to(device)
-    return ModelLook(trained.predictor), trained.sweeps
+    return ModelLook(trained.predictor, trained.likely_targets()), trained.sweeps
 
 
 def oracle(config: OracleConfig) -> None:
     """Write every row's report to ``out`` and print the main figures."""
+    if config.checkpoint is not None:
+        refuse_idle(("grid", "inference"), "with a checkpoint, which has its own")
     dataset, reader = config.dataset, config.dataset.reader()
-    device = torch.device("cuda" if config.checkpoint and torch.cuda.is_available() else "cpu")
+    device = chosen_device(config.device)
     look, previous = look_of(config, reader.taxonomy, device)
     check_labels(reader, config.split)
+    check_extent(config.extent, reader, config.split)
     tables = InstanceTables(reader, config.extent, dataset.tables)
     ladder = Ladder(reader.taxonomy, tables, look, config.tracker, device)
     climb(ladder, reader, config.split, previous, ahead=dataset.workers > 0)

@@ -1,7 +1,6 @@
 """Fusion of semantics, detections and memberships into one label a point (paper, inference; Algorithm 1)."""
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 import torch
@@ -12,20 +11,11 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from most.errors import ConfigError
-from most.membership import Evidence, Pairs, RegionOfInterest
-from most.structures import Detections, OnDevice, Panoptic
+from most.membership import Claims, Evidence, Membership, RegionOfInterest
+from most.membership.rating import best
+from most.structures import Detections, Panoptic
 
-MEMBER = 0.5  # a pair belongs together above this confidence (Algorithm 1, line 10)
 UNCLAIMED = ("nearest", "cluster", "zero")
-
-
-@runtime_checkable
-class Membership(Protocol):
-    """Whatever rates pairs of points and centres."""
-
-    def __call__(self, evidence: Evidence, pairs: Pairs) -> Float[Tensor, "pairs"]:
-        """Return each pair's confidence in [0, 1]."""
-        ...
 
 
 @dataclass
@@ -51,42 +41,23 @@ class Fusion:
 
 
 @dataclass
-class Assignment(OnDevice):
-    """Points and the centres that claim them, before and after the unclaimed are dealt with."""
+class Assignment(Claims):
+    """Points and the detections that claim them, before and after the unclaimed are dealt with."""
 
-    claimed: Int64[Tensor, "points"]  # index of the detection whose member the point is, -1 for none
     panoptic: Panoptic
 
 
 def fuse(
     evidence: Evidence, things: list[int], membership: Membership, roi: RegionOfInterest, fusion: Fusion
 ) -> Assignment:
-    """Return the panoptic labels of one sweep; ``things`` are training ids.
-
-    A detection's points keep their predicted class, which is the detection's own: points of another class are never
-    its members (Algorithm 1, line 7, prints this the wrong way round).
-    """
-    points, semantics, detections = evidence.points, evidence.semantics, evidence.detections
-    pairs = roi.pairs(points, semantics, detections)
-    confidence = membership(evidence, pairs)
-    members = confidence > MEMBER
-    rank = confidence if fusion.overlap == "confident" else -pairs.detections.to(confidence.dtype)
-    claimed = _best(len(points), pairs.select(members), rank[members])
-    ids = claimed + 1
+    """Return the panoptic labels of one sweep; ``things`` are training ids."""
+    points, semantics = evidence.points, evidence.semantics
+    claims = membership.claim(evidence, roi, fusion.overlap)
+    ids = claims.claimed + 1
     if fusion.unclaimed != "zero":
-        left = torch.isin(semantics, torch.tensor(things, device=semantics.device)) & (claimed < 0)
-        ids[left] = _adopt(points[left], semantics[left], detections, roi, fusion)
-    return Assignment(claimed, Panoptic(semantics, ids))
-
-
-def _best(count: int, pairs: Pairs, rank: Float[Tensor, "pairs"]) -> Int64[Tensor, "points"]:
-    """Return for each point the detection of its highest-ranked pair (the first of equals), -1 where it has none."""
-    order = torch.argsort(rank, descending=True, stable=True)
-    best = torch.full((count,), -1, dtype=torch.long, device=rank.device)
-    taken, first = np.unique(pairs.points[order].cpu().numpy(), return_index=True)
-    chosen = order[torch.as_tensor(first, device=rank.device)]
-    best[torch.as_tensor(taken, device=rank.device)] = pairs.detections[chosen]
-    return best
+        left = torch.isin(semantics, torch.tensor(things, device=semantics.device)) & (claims.claimed < 0)
+        ids[left] = _adopt(points[left], semantics[left], claims.detections, roi, fusion)
+    return Assignment(claims.detections, claims.claimed, Panoptic(semantics, ids))
 
 
 def _adopt(
@@ -101,7 +72,7 @@ def _adopt(
     if fusion.unclaimed == "nearest":
         pairs = roi.pairs(points, semantics, detections, fusion.reach)
         distance = (points[pairs.points] - detections.centres[pairs.detections]).norm(dim=1)
-        ids = _best(len(points), pairs, -distance) + 1
+        ids = best(len(points), pairs, -distance) + 1
     alone = ids == 0
     ids[alone] = cluster(points[alone], semantics[alone], fusion.cluster_radius) + 1 + len(detections)
     return ids

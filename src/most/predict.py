@@ -1,19 +1,17 @@
 """Label a split with a trained model: ``python -m most.predict checkpoint=FILE split=val out=FOLDER``."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import hydra
-import torch
 from omegaconf import MISSING, DictConfig
 
-from most.assembly import load_trained
+from most.assembly import exchange_membership, load_trained
 from most.config import conf_dir, register, store_root, typed
 from most.datasets.scan_folder import ScanFolder, ScanFolderSettings
-from most.entry import run, start
-from most.errors import ConfigError
-from most.membership import Nearest
+from most.device import chosen_device
+from most.entry import refuse_idle, run, start
 from most.predicting import describe_model, predict_split
 from most.predicting_scans import predict_scans
 from most.streaming import PanopticTracker
@@ -30,18 +28,11 @@ class PredictConfig:
     input: str | None = None  # a folder of scans that belongs to no dataset: it is labelled in the dataset's stead
     scans: ScanFolderSettings = field(default_factory=ScanFolderSettings)  # how those are read
     tracker: Any = None
-    nearest: bool = False  # leave stage 2 out: points go to the nearest centre
+    membership: Any = None  # another than the checkpoint's: stage 2 is left out
     device: str = "auto"  # auto: a GPU where there is one
 
     def __post_init__(self) -> None:
-        self.chosen_device()
-
-    def chosen_device(self) -> torch.device:
-        """Return where to predict; one that is not there is a ConfigError."""
-        there = torch.cuda.is_available()
-        if self.device not in ("auto", "cpu", *(["cuda"] if there else [])):
-            raise ConfigError(f"device: expected auto, cpu, or cuda where there is a GPU, found {self.device}")
-        return torch.device("cuda" if there and self.device != "cpu" else "cpu")
+        chosen_device(self.device)
 
 
 register()
@@ -50,12 +41,16 @@ store_root("predict", PredictConfig)
 
 def predict(config: PredictConfig) -> None:
     """Write labels with the numbers of tracks, and detections beside them, to the folder ``out``."""
+    if config.input is None:
+        refuse_idle(("scans",), "without input=FOLDER, whose scans they are about")
+    else:
+        refuse_idle(("dataset", "split"), "with input, whose scans belong to no dataset")
     checkpoint = Path(config.checkpoint)
     trained = load_trained(checkpoint)
-    if config.nearest:
-        trained = replace(trained, predictor=replace(trained.predictor, membership=Nearest()))
-    model = PanopticTracker(trained, config.tracker, config.chosen_device())
-    described = describe_model(checkpoint, config.nearest, config.tracker)
+    if config.membership is not None:
+        trained = exchange_membership(trained, config.membership)
+    model = PanopticTracker(trained, config.tracker, chosen_device(config.device))
+    described = describe_model(checkpoint, config.membership, config.tracker)
     if config.input is None:
         reader, ahead = config.dataset.reader(), config.dataset.workers > 0
         predict_split(model, described, reader, config.split, Path(config.out), ahead)

@@ -2,18 +2,22 @@
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import torch
+from jaxtyping import Int64
+from torch import Tensor
 from tqdm import tqdm
 
 from most.datasets.labels import read_labels, write_labels
 from most.datasets.scan_folder import Scan, ScanFolder
-from most.errors import named
-from most.metrics.assignments import assignments_path, write_assignments
-from most.predicting import assignments_of, claim_folder, encode, join_prediction
+from most.datasets.taxonomy import Taxonomy
+from most.inference import Prediction
+from most.predicting import claim_folder
+from most.predictions import say_once
 from most.streaming import PanopticTracker
 
 
@@ -33,22 +37,31 @@ def describe_scans(scans: ScanFolder) -> dict[str, Any]:
 
 
 def label_scans(model: PanopticTracker, scans: ScanFolder, out: Path) -> None:
-    """Label one scan after the other: ``out/predictions/NAME.label``, a uint32 a point, and detections beside them.
-
-    What is labelled already is taken in as it is: a run that goes on writes what it would have written.
-    """
+    """Label one scan after the other: ``out/predictions/NAME.label``, and detections beside them; see ``say_once``."""
     model.begin()
     for scan in tqdm(scans, "predict", unit="scan"):
         path = out / "predictions" / f"{scan.name}.label"
-        with named(path):
-            _label(model, scan, path)
+        say_once(ScanLabels(model.taxonomy), path, partial(_say, model, scan), partial(_take_in, model, scan))
 
 
-def _label(model: PanopticTracker, scan: Scan, path: Path) -> None:
-    taxonomy = model.taxonomy
-    if path.is_file():
-        model.recall(join_prediction(taxonomy, read_labels(path), path), scan.points, scan.pose, scan.time)
-        return
-    said = model.step(scan.points, scan.pose, scan.time).prediction
-    write_assignments(assignments_path(path), assignments_of(said))
-    write_labels(path, encode(taxonomy, said))
+@dataclass
+class ScanLabels:
+    """Label files of scans that belong to no dataset: a uint32 a point, as the model's own dataset encodes them."""
+
+    taxonomy: Taxonomy
+
+    def read_prediction(self, path: Path) -> Int64[Tensor, "points"]:
+        """Read the labels of a scan."""
+        return read_labels(path)
+
+    def write_prediction(self, path: Path, labels: Int64[Tensor, "points"]) -> None:
+        """Write the labels of a scan."""
+        write_labels(path, labels)
+
+
+def _say(model: PanopticTracker, scan: Scan) -> Prediction:
+    return model.step(scan.points, scan.pose, scan.time).prediction
+
+
+def _take_in(model: PanopticTracker, scan: Scan, said: Prediction) -> None:
+    model.recall(said, scan.points, scan.pose, scan.time)

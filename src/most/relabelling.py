@@ -11,7 +11,7 @@ from tqdm import tqdm
 from most.claims import claim
 from most.datasets.reader import Frame, Reader
 from most.datasets.taxonomy import Taxonomy
-from most.errors import DataError, named
+from most.errors import check_entries, named
 from most.metrics.assignments import Assignments, assignments_path, read_assignments, write_assignments
 from most.metrics.folders import prediction_paths
 from most.structures import Panoptic, Sweep
@@ -22,7 +22,7 @@ RECORD = "tracks.json"
 
 def new_tracker(settings: TrackerSettings, taxonomy: Taxonomy) -> Tracker:
     """Make the tracker of one sequence, whose numbers labels have room for."""
-    return settings.build(taxonomy.gates, taxonomy.label.step - 1, taxonomy.label.unique_in == "class")
+    return settings.build(taxonomy.gates, taxonomy.label.largest, taxonomy.label.unique_in == "class")
 
 
 def write_tracks(reader: Reader, split: str, predictions: Path, out: Path, settings: TrackerSettings) -> None:
@@ -65,11 +65,9 @@ def _observe(
     taxonomy: Taxonomy, sweep: Sweep, labels: Int64[Tensor, "labels"], found: Assignments | None, source: Path
 ) -> Segments:
     """Observe the segments of a prediction; they are told apart by their whole labels, as the benchmarks do."""
-    if len(labels) != len(sweep.points) or (found is not None and len(found.assigned) != len(labels)):
-        raise DataError(
-            f"{source}: expected a label for each of the scan's {len(sweep.points)} points, found {len(labels)} labels"
-            + (f" and {len(found.assigned)} assigned points beside them" if found is not None else "")
-        )
+    check_entries(source, len(labels), len(sweep.points))
+    if found is not None:
+        check_entries(assignments_path(source), len(found.assigned), len(labels), "an entry")
     segments = Panoptic(taxonomy.decode(labels, source), labels * (taxonomy.instance_of(labels) != 0))
     beside = (None, None) if found is None else (found.detections, found.assigned)
     return observe(sweep.points[:, :3], segments, taxonomy.things, *beside)

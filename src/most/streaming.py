@@ -23,7 +23,7 @@ from torch import Tensor
 from most.assembly import Trained, load_trained
 from most.datasets.kitti_files import check_rigid
 from most.datasets.windows import SlidingWindow, Window
-from most.errors import DataError
+from most.errors import DataError, check_entries
 from most.inference import Prediction
 from most.relabelling import new_tracker
 from most.structures import Panoptic, Sweep, Tracks
@@ -145,8 +145,8 @@ class PanopticTracker:
 
         The numbers that ``said`` has do not matter: what was followed before gets the same ones again.
         """
-        if len(said.claimed) != len(sweep.points):
-            raise DataError(f"expected labels of the scan's {len(sweep.points)} points, found {len(said.claimed)}")
+        check_entries("labels", len(said.panoptic.ids), len(sweep.points))
+        check_entries("detections", len(said.claimed), len(sweep.points), "an entry")
         points, things = sweep.points[:, :3], self.taxonomy.things
         segments = observe(points, said.panoptic, things, said.detections, said.claimed)
         return segments.rename(self.tracker.step(segments.observations, sweep.pose if posed else None, sweep.time))

@@ -32,19 +32,20 @@ class OnDevice:
 
 
 class Rows(OnDevice):
-    """A dataclass of tensors that all have a row for each item."""
+    """A dataclass of tensors that all have a row for each item; an optional one is None for all of them."""
 
     def __len__(self) -> int:
         return len(next(iter(vars(self).values())))
 
     def select(self: Table, keep: Tensor) -> Table:
         """Keep the rows that a boolean mask or an index names."""
-        return type(self)(**{name: value[keep] for name, value in vars(self).items()})
+        return type(self)(**{name: None if value is None else value[keep] for name, value in vars(self).items()})
 
     @classmethod
     def cat(cls: type[Table], parts: list[Table]) -> Table:
         """Put several tables under one another."""
-        return cls(**{name: torch.cat([getattr(part, name) for part in parts]) for name in vars(parts[0])})
+        columns = {name: [getattr(part, name) for part in parts] for name in vars(parts[0])}
+        return cls(**{name: None if column[0] is None else torch.cat(column) for name, column in columns.items()})
 
 
 @dataclass
@@ -66,10 +67,11 @@ class Instances(Rows):
     keys: Int64[Tensor, "instances"]  # raw label: unique within the sweep
     classes: Int64[Tensor, "instances"]
     counts: Int64[Tensor, "instances"]  # points in this sweep
-    centres: Float[Tensor, "instances 3"]  # modal centre: mean of the instance's points, m
+    centres: Float[Tensor, "instances 3"]  # modal centre: mean of the instance's points, m; a box's middle if amodal
     extents: Float[Tensor, "instances 3"]  # half-sizes about the centre along the axes, m, by the extent strategy
     velocities: Float[Tensor, "instances 2"]  # of the centre relative to the ground, turned into the axes here, m/s
     velocity_known: Bool[Tensor, "instances"]
+    yaws: Float[Tensor, "instances"] | None = None  # from x to where ``extents`` lie along; None: along the axes
 
 
 @dataclass
@@ -108,6 +110,7 @@ class BevMaps(OnDevice):
     height: Float[Tensor, "batch 1 x y"]  # z of the modal centre, m
     extent: Float[Tensor, "batch 3 x y"]  # log of the half-sizes in m
     velocity: Float[Tensor, "batch 2 x y"]  # m/s
+    yaw: Float[Tensor, "batch 2 x y"] | None = None  # sine and cosine of twice the yaw: boxes have no front
 
 
 @dataclass
@@ -118,7 +121,14 @@ class Detections(Rows):
     scores: Float[Tensor, "detections"]  # in [0, 1]
     centres: Float[Tensor, "detections 3"]  # m
     extents: Float[Tensor, "detections 3"]  # half-sizes, m
-    velocities: Float[Tensor, "detections 2"]  # m/s
+    velocities: Float[Tensor, "detections 2"]  # m/s; NaN where unknown
+    yaws: Float[Tensor, "detections"] | None = None  # from x to where ``extents`` lie along; None: along the axes
+
+    @staticmethod
+    def none(like: Tensor) -> "Detections":
+        """Detections of a sweep in which there are none, where ``like`` lies and of its kind."""
+        row = like.new_zeros(0, 3)
+        return Detections(row[:, 0].long(), row[:, 0], row, row, row[:, :2])
 
 
 @dataclass
@@ -139,6 +149,7 @@ class Observations(Rows):
     velocities: Float[Tensor, "segments 2"]  # relative to the ground, along the axes here, m/s
     velocity_known: Bool[Tensor, "segments"]
     scores: Float[Tensor, "segments"]  # in [0, 1]
+    placed: Bool[Tensor, "segments"]  # False where no point is finite: centre and extents say nothing then
 
 
 @dataclass

@@ -10,7 +10,7 @@ from tqdm import tqdm
 
 from most.datasets.reader import Frame, Reader
 from most.datasets.taxonomy import Taxonomy
-from most.errors import DataError
+from most.errors import DataError, check_entries
 from most.files import atomic_write, is_partial
 
 FILE, FOLDER = 0o100644 << 16, 0o40755 << 16 | 0x10  # what they are, and who may read them
@@ -57,12 +57,11 @@ def find_problems(reader: Reader, frames: Sequence[Frame], folder: Path, progres
     for path, frame in tqdm(paths.items(), "check", unit="scan", disable=not progress):
         try:
             labels = reader.read_prediction(path)
+            check_entries(path, len(labels), reader.num_points(frame))
             semantics = reader.taxonomy.decode(labels, path)
         except DataError as error:
             yield str(error)
             continue
-        if len(labels) != (points := reader.num_points(frame)):
-            yield f"{path}: expected a label for each of the scan's {points} points, found {len(labels)}"
         yield from (f"{path}: {problem}" for problem in _label_problems(reader.taxonomy, labels, semantics))
     for place in sorted({path.parent for path in paths}):
         others = set(place.iterdir()) - set(paths) if place.is_dir() else set()

@@ -11,25 +11,33 @@ from lightning.pytorch.callbacks import Callback, LearningRateMonitor, ModelChec
 from lightning.pytorch.loggers import Logger
 
 from most.assembly import (
+    STAGE1_RUN,
     build_membership,
     build_network,
     build_predictor,
     describe,
     describe_run,
     load_trained,
+    load_weights,
     model_parts,
+    read_checkpoint,
+    stage1_parts,
+    training_of,
 )
 from most.config import Config
 from most.datasets.class_counts import class_counts
 from most.datasets.datamodule import SweepDataModule
 from most.datasets.reader import Reader
-from most.membership import Nearest, PointSegMLP
+from most.membership import PointSegMLP
 from most.stages.callbacks import Throughput
 from most.stages.checkpoints import AtomicCheckpointIO, LastCheckpoint
-from most.stages.detection import DetectionStage
+from most.stages.detection import DetectionStage, DetectionTraining
 from most.stages.membership import MembershipStage
 from most.stages.stage import Stage
 from most.viz.callback import BevPictures
+from most.viz.class_tables import ClassTables
+
+METRICS = "metrics.json"  # of a run; it is written at its end
 
 
 def build_stage(name: str, config: Config, data: SweepDataModule, stage1: Path) -> Stage:
@@ -42,10 +50,13 @@ def build_stage(name: str, config: Config, data: SweepDataModule, stage1: Path) 
 
 
 def build_detection(config: Config, data: SweepDataModule) -> DetectionStage:
-    """Make the network and wire it for stage 1, which knows no membership but the nearest centre."""
-    taxonomy, parts = data.reader.taxonomy, model_parts(config) | {"membership": Nearest()}
-    predictor = build_predictor(build_network(parts, taxonomy), parts, taxonomy)
-    training = config.stage.detection
+    """Make the network and wire it for stage 1, which knows no membership that has to be trained."""
+    taxonomy, parts = data.reader.taxonomy, stage1_parts(config)
+    network = build_network(parts, taxonomy)
+    if config.weights is not None:
+        load_weights(network, "network", read_checkpoint(stage1_file(config, Path(config.weights)))["state_dict"])
+    predictor = build_predictor(network, parts, taxonomy)
+    training: DetectionTraining = training_of(config, "detection")
     balanced = training.losses.class_balance > 0
     counts = class_counts(data.reader, "train") if balanced else torch.ones(taxonomy.num_classes, dtype=torch.long)
     scans = len(data.reader.frames("train"))
@@ -68,10 +79,11 @@ def batches_per_step(config: Config, stage: str) -> int:
 def build_membership_stage(config: Config, stage1: Path, reader: Reader) -> MembershipStage:
     """Read stage 1 from a checkpoint and put a new membership after it."""
     parts, taxonomy = model_parts(config), reader.taxonomy
-    predictor = replace(load_trained(stage1).predictor, settings=config.inference)
+    trained = load_trained(stage1)
+    predictor = replace(trained.predictor, settings=config.inference)
     membership = build_membership(parts, predictor.network, taxonomy)
     assert isinstance(membership, PointSegMLP)  # most.checks
-    notes = _notes(config, "membership", parts, reader)
+    notes = _notes(config, "membership", parts, reader) | {STAGE1_RUN: trained.stage1}
     return MembershipStage(predictor, membership, taxonomy, config.stage.membership, notes, config.seed)
 
 
@@ -88,10 +100,22 @@ def checkpoint_path(folder: Path, stage: str, which: str) -> Path:
     return folder / "checkpoints" / f"{stage}-{which}.ckpt"
 
 
-def handed_over(config: Config, folder: Path) -> Path:
-    """Return the stage 1 that stage 2 of the same run gets: the last one where a run never validated on the way."""
-    best = checkpoint_path(folder, "detection", "best")
-    return best if config.stage.hand_over == "best" and best.is_file() else checkpoint_path(folder, "detection", "last")
+def run_files(config: Config, folder: Path) -> dict[str, list[Path]]:
+    """Return what a finished run leaves, by kind: its last model, its figures, and what it was told."""
+    told = [folder / ".hydra" / name for name in ("config.yaml", "overrides.yaml")]
+    model = checkpoint_path(folder, config.stage.run[-1], "last")
+    return {"model": [model], "metrics": [folder / METRICS], "config": told}
+
+
+def stage1_file(config: Config, place: Path) -> Path:
+    """Return the stage 1 that stage 2 gets: ``place`` itself, or of the run in this folder.
+
+    It is the last one where that run never validated on the way.
+    """
+    if not place.is_dir():
+        return place
+    best = checkpoint_path(place, "detection", "best")
+    return best if config.stage.hand_over == "best" and best.is_file() else checkpoint_path(place, "detection", "last")
 
 
 def build_trainer(config: Config, stage: Stage, folder: Path, logger: Logger | bool) -> L.Trainer:
@@ -141,7 +165,7 @@ def _callbacks(config: Config, stage: Stage, folder: Path) -> list[Callback]:
         Throughput(stage.prefix),
     ]
     if config.logger.kind != "none":
-        callbacks.append(LearningRateMonitor("step"))
+        callbacks += [LearningRateMonitor("step"), ClassTables(stage.prefix)]
     if config.logger.pictures:
         callbacks.append(BevPictures(config.logger.pictures, folder / "pictures" / stage.name, stage.prefix))
     if config.trainer.progress_bar:

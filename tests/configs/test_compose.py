@@ -6,7 +6,8 @@ import pytest
 from hydra import compose, initialize_config_dir
 from omegaconf import OmegaConf
 
-from most.config import conf_dir, typed
+from most.checks import check_dropped
+from most.config import COMPONENTS, conf_dir, typed
 
 ROOTS = sorted(path.stem for path in conf_dir().glob("*.yaml"))
 OPTIONS = sorted((path.parent.name, path.stem) for path in conf_dir().glob("*/*.yaml"))
@@ -76,6 +77,14 @@ def test_values_out_of_range_are_refused(override, message):
 def test_unknown_keys_and_wrong_types_do_not_compose(override):
     with pytest.raises(Exception, match=override.split("=")[0].split(".")[-1]):
         compose("train", [override])
+
+
+@pytest.mark.parametrize("experiment", ["sim_ablation", "sim_ablation_small", "nuscenes_max"])
+@pytest.mark.parametrize("extent", sorted(path.stem for path in (conf_dir() / "extent").glob("*.yaml")))
+def test_an_extent_strategy_is_one_word_away(experiment, extent):
+    config = typed(compose("train", [f"+experiment={experiment}", f"extent={extent}"]))
+    assert isinstance(config.extent, COMPONENTS["extent"][extent])
+    check_dropped(config)
 
 
 def test_composed_configurations_are_plain_enough_to_log():

@@ -9,9 +9,13 @@ import torch
 from scipy.spatial import cKDTree
 from torch import Tensor
 
+from most.datasets.instances import InstanceTables
 from most.datasets.nuscenes import PanopticNuScenes, SceneSplits
 from most.datasets.reader import Frame
-from most.geometry.poses import relative, transform
+from most.geometry.boxes import along
+from most.geometry.poses import relative, transform, yaw
+from most.modal.amodal import Amodal
+from most.modal.boxes import BoxedTable
 
 REAL = os.environ.get("MOST_REAL_DATA")
 SCENE = "scene-1072"
@@ -62,6 +66,24 @@ def test_points_of_a_box_are_of_its_category(reader: PanopticNuScenes) -> None:
             total += int(inside.sum())
     assert total > 3000
     assert agreeing / total > 0.9
+
+
+def test_every_instance_has_the_box_that_holds_its_points(reader: PanopticNuScenes, tmp_path: Path) -> None:
+    """The boxes of an object hold nearly all points of the instance whose modal centres lie in them."""
+    table = InstanceTables(reader, Amodal(), tmp_path).table(SCENE)
+    assert isinstance(table, BoxedTable)
+    assert len(table.track_outlines) > 5
+    assert table.boxes.known.all()
+    inside = 0
+    for number, frame in enumerate(reader.key_frames(SCENE)):
+        sweep, rows = reader.sweep(frame), table.rows(number)
+        assert sweep.labels is not None
+        headings = table.boxes.yaws[rows] - yaw(sweep.pose)
+        for row, heading in zip(rows.tolist(), headings, strict=True):
+            points = sweep.points[sweep.labels == table.keys[row], :3].double()
+            away = along(points - table.boxes.centres[row], heading.expand(len(points)))
+            inside += int((away.abs() <= table.boxes.half_sizes[row] + HAND).all(1).sum())
+    assert inside / int(table.counts.sum()) > 0.99
 
 
 def test_a_thing_is_an_instance_through_the_scene(reader: PanopticNuScenes) -> None:

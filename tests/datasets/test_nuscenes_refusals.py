@@ -186,7 +186,7 @@ def cut(size: int) -> Callable[[Path], object]:
     [
         (SWEEP, Path.unlink, f"expected the sweep of sample_data {SCENE}-2, found no file; .*dataset.sweeps=0"),
         (SWEEP, cut(21), f"expected a multiple of 20 bytes .* of sample_data {SCENE}-2, found 21; .*copy it again"),
-        (SWEEP, cut(20), "expected a label for each of the sweep's 1 points, found 8"),
+        (SWEEP, cut(20), "expected a label for each of the scan's 1 points, found 8"),
         (LABELS, Path.unlink, "expected panoptic labels, found no file"),
         (LABELS, cut(80), "expected an archive with the array data, found something else"),
         (LABELS, cut(0), "expected an archive with the array data, found something else"),
@@ -195,7 +195,7 @@ def cut(size: int) -> Callable[[Path], object]:
         (LABELS, archive(data=np.zeros(8, np.int64)), r"expected data of uint16, .* found int64 of shape \(8,\)"),
         (LABELS, archive(data=np.zeros((8, 1), np.uint16)), r".*found uint16 of shape \(8, 1\)"),
         (LABELS, archive(data=np.array([{}] * 8)), "expected an archive .*allow_pickle=False"),
-        (LABELS, archive(data=np.zeros(7, np.uint16)), "expected a label for each of the sweep's 8 points, found 7"),
+        (LABELS, archive(data=np.zeros(7, np.uint16)), "expected a label for each of the scan's 8 points, found 7"),
     ],
 )
 def test_faulty_file(reader: PanopticNuScenes, name: str, change: Callable, message: str) -> None:

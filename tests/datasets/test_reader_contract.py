@@ -54,7 +54,7 @@ def test_splits_list_their_frames_in_order(reader: Reader, split: str) -> None:
 def test_key_frames_are_frames(reader: Reader, frame: Frame) -> None:
     frames = reader.frames_of(frame.sequence)
     assert frames == sorted(set(frames))
-    assert set(reader.key_frames(frame.sequence)) <= set(frames)
+    assert set(reader.key_frames(frame.sequence)) <= set(reader.annotated(frame.sequence)) <= set(frames)
 
 
 def test_labelled_frames_have_labels(reader: Reader) -> None:
@@ -118,6 +118,18 @@ def test_sources_are_there(reader: Reader, frame: Frame) -> None:
     large, small = reader.sources(frame.sequence)
     assert len(large) >= 2 * len(reader.key_frames(frame.sequence))
     assert all(path.is_file() for path in [*large, *small])
+
+
+def test_boxes_are_of_key_frames_and_things(reader: Reader, frame: Frame) -> None:
+    if not (files := reader.box_files(frame.sequence)):
+        pytest.skip("this tree has no boxes")
+    boxes = reader.sequence_boxes(frame.sequence)
+    assert all(path.is_file() for path in files)
+    assert set(boxes.frames.tolist()) <= {frame.index for frame in reader.key_frames(frame.sequence)}
+    assert reader.taxonomy.is_thing(boxes.classes).all()
+    assert (boxes.half_sizes > 0).all()
+    assert boxes.centres.dtype == boxes.yaws.dtype == torch.float64
+    assert boxes.objects.unique().tolist() == list(range(int(boxes.objects.max()) + 1))
 
 
 def test_predictions_have_places_of_their_own(reader: Reader, tmp_path: Path) -> None:

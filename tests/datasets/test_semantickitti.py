@@ -8,7 +8,7 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from omegaconf import OmegaConf
 
 from most.datasets.reader import Frame
-from most.datasets.semantickitti import SemanticKITTI, Splits
+from most.datasets.semantickitti import SemanticKITTI, SemanticKITTISettings, Splits
 from most.errors import ConfigError, DataError
 from semantickitti_tree import CAR, lidar_pose
 
@@ -53,6 +53,15 @@ def test_scans_may_start_at_any_number(tree: Path, add_sequence: Callable[..., P
     assert sweep.index == 7
     assert sweep.time == pytest.approx(0.7)
     np.testing.assert_allclose(sweep.pose, lidar_pose(7), atol=1e-12)
+
+
+def test_every_third_scan_can_be_a_key_frame(tree: Path, add_sequence: Callable[..., Path]) -> None:
+    add_sequence("05", range(2, 8))
+    reader = SemanticKITTI(tree, Splits(val=["05"]), key_every=3)
+    assert reader.frames("val") == reader.labelled_frames("val") == [Frame("05", 3), Frame("05", 6)]
+    assert len(reader.frames_of("05")) == len(reader.annotated("05")) == 6  # velocities are told by all of them
+    with pytest.raises(ConfigError, match=r"dataset\.key_every: expected at least 1, found 0"):
+        SemanticKITTISettings(key_every=0)
 
 
 def test_prediction_path_is_the_official_one(tree: Path) -> None:

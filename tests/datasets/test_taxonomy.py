@@ -124,7 +124,7 @@ def test_every_taxonomy_file_holds_together(path: Path) -> None:
 )
 def test_faulty_file_is_refused(tmp_path: Path, change: dict, message: str) -> None:
     void = {"name": "void", "kind": "void", "raw": [0], "colour": [0, 0, 0]}
-    car = {"name": "car", "kind": "thing", "raw": [1], "colour": [1, 1, 1], "gate": 4}
+    car = {"name": "car", "kind": "thing", "raw": [1], "colour": [1, 1, 1], "gate": 4, "box": [4, 2]}
     top = {key: value for key, value in change.items() if key not in void}
     inner = {key: value for key, value in change.items() if key in void}
     label = {"high": "class", "step": 10, "unique_in": "class"}
@@ -137,7 +137,7 @@ def test_faulty_file_is_refused(tmp_path: Path, change: dict, message: str) -> N
 
 
 @pytest.mark.parametrize(("gate", "message"), [
-    (None, "expected the keys name, kind, raw, colour, gate"), (0, "gate: expected metres above 0, found 0"),
+    (None, "expected the keys name, kind, raw, colour, gate, box"), (0, "gate: expected metres above 0, found 0"),
     ("4", "gate: expected metres above 0, found '4'"),
 ])  # fmt: skip
 def test_a_thing_without_a_gate_is_refused(tmp_path: Path, gate: object, message: str) -> None:

@@ -1,14 +1,13 @@
 """The whole way through the real commands, as a newcomer would type them: simulate, train, predict, evaluate, draw."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from commands import SIMULATE, SPLITS, TRAIN, most
+from wandb_run import OfflineRun, read_run
 
 MODEL = "run/checkpoints/membership-last.ckpt"
 
@@ -35,21 +34,56 @@ def test_training_leaves_metrics_checkpoints_and_pictures(run):
         assert list((run / "run" / "pictures" / stage).rglob("*.png"))
 
 
-def test_the_offline_wandb_run_holds_configuration_losses_metrics_rate_throughput_and_pictures(run):
-    (binary,) = (run / "run" / "wandb").glob("offline-run-*/*.wandb")
-    done = subprocess.run(
-        [sys.executable, "-m", "wandb", "leet", "inspect", "--json", str(binary)],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+@pytest.fixture(scope="module")
+def logged(run) -> OfflineRun:
+    """What that training told W&B."""
+    return read_run(run / "run")
+
+
+def test_the_offline_run_holds_configuration_losses_metrics_rate_and_throughput(logged):
+    for key in ("train/loss_heatmap", "train/loss_voxel", "val/pq", "val/miou", "lr-AdamW", "lr-SGD",
+                "train/scans_per_second", "membership/train/loss", "membership/val/pq", "membership/val/nearest_pq",
+                "val/class_pq/car"):  # fmt: skip
+        assert isinstance(logged.last[key], int | float), key
+    assert logged.config["stage"]["membership"]["epochs"] == 2
+    assert logged.config["backbone"]["widths"] == [4, 4, 8, 8]
+    assert logged.config["choices"]["extent"] == "track_max"
+    assert logged.config["overrides"]["stage.membership.epochs"] == "2"
+
+
+def test_the_offline_run_holds_pictures_tables_and_confusion_matrices(run, logged):
+    for name in ("images/val/bev_1_", "images/membership/val/bev_2_", "table/val/per_class_",
+                 "table/val/confusion_matrix_table_", "table/membership/val/confusion_matrix_table_"):  # fmt: skip
+        assert any(path.startswith(name) for path in logged.media), name
+    (confusion,) = (run / "run").rglob("media/table/membership/val/confusion_matrix_table_*.json")
+    (per_class,) = (run / "run").rglob("media/table/membership/val/per_class_*.json")
+    labelled = sum(points for _, _, points in json.loads(confusion.read_text())["data"])
+    seen = sum(
+        (np.fromfile(path, "<u4") & 0xFFFF > 0).sum() for path in (run / "streets/sequences/01/labels").iterdir()
+    )
+    assert 0.9 * seen < labelled <= seen  # outliers are void, too
+    report = json.loads((run / "run" / "metrics.json").read_text())["panoptic"]["per_class"]
+    assert {row[0]: row[1] for row in json.loads(per_class.read_text())["data"]} == {
+        name: figures["pq"] for name, figures in report.items()
+    }
+
+
+def test_the_offline_run_holds_checkpoint_figures_and_settings_as_artifacts(logged):
+    assert logged.artifacts.pop("model") == ["membership-last.ckpt"]
+    assert logged.artifacts.pop("metrics") == ["metrics.json"]
+    assert logged.artifacts.pop("config") == ["config.yaml", "overrides.yaml"]
+    assert set(logged.artifacts) <= {"run_table", "job"}  # those that W&B makes of media
+
+
+def test_every_key_of_the_dashboard_is_one_that_a_training_logs(run, logged):
+    done = most(run, "dashboard", "out=dashboard.json")
     assert done.returncode == 0, done.stderr
-    for key in ("train/loss_heatmap", "train/loss_voxel", "val/pq", "val/miou", "lr-Adam", "scans_per_second",
-                "images/val/bev_", "images/membership/val/bev_", "membership/train/loss", "membership/val/pq",
-                "membership/val/nearest_pq", "lr-SGD"):  # fmt: skip
-        assert key in done.stdout, key
-    (settings,) = (record["run"]["config"]["update"] for record in map(json.loads, done.stdout.splitlines())
-                   if "config" in record.get("run", {}))  # fmt: skip
-    assert settings["stage"]["membership"]["epochs"] == 2
-    assert settings["backbone"]["widths"] == [4, 4, 8, 8]
+    said = json.loads((run / "dashboard.json").read_text())
+    keys = [key for section in said["sections"] for panel in section["panels"] for key in panel["keys"]]
+    assert len(keys) > 40
+    assert [key for key in keys if not logged.logged(key)] == []
+    assert all(name in logged.config["choices"] for name in ("extent", "membership"))
+    assert said["grouped_by"] == ["choices.extent", "choices.membership"]
 
 
 def test_predictions_cover_every_point_and_are_scored(run):
@@ -74,7 +108,7 @@ def test_predictions_cover_every_point_and_are_scored(run):
     for name in ("pq", "sq", "rq", "pq_things", "pq_dagger", "miou", "membership_accuracy"):
         assert scores[name] == (trained[name] and pytest.approx(trained[name], abs=1e-6)), name
 
-    done = most(run, "predict", f"checkpoint={MODEL}", "split=val", "out=nearest", "nearest=true",
+    done = most(run, "predict", f"checkpoint={MODEL}", "split=val", "out=nearest", "membership=nearest",
                 "dataset=simulated", "dataset.root=streets", "dataset.workers=0", *SPLITS)  # fmt: skip
     assert done.returncode == 0, done.stderr
     done = most(run, "evaluate", "predictions=nearest", "split=val", "out=nearest.json", "dataset=simulated",
@@ -161,6 +195,7 @@ def test_the_oracle_ladder_stands_on_a_model_or_on_none(run):
         done = most(run, "oracle", *told, *arguments)
         assert done.returncode == 0, done.stderr
         assert "everything, semantics by voxel" in done.stdout
+        assert "does not say how heat maps were drawn" not in done.stderr  # stage 2 knows what its stage 1 learned from
         assert all(len(line) <= 120 for line in done.stdout.splitlines())
     none, model = (json.loads((run / f"{name}.json").read_text())["rows"] for name in ("none", "ladder"))
     assert none["everything"] == model["everything"]

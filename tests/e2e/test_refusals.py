@@ -49,6 +49,8 @@ def refused(folder: Path, command: str, *arguments: str, **limits: int) -> str:
     ("argument", "words"),
     [
         ("stage.detection.learning_rate=1", ["learning_rate", "not in 'DetectionTraining'"]),
+        ("extent=trackmax", ["extent/trackmax", "amodal", "class_mean", "drop_small", "shrink_wrap", "track_max"]),
+        ("extent=amodal", ["extent: expected amodal boxes", "found none for 00 in tree", "extent, such as track_max"]),
         ("backbone=resnet", ["backbone/resnet", "asymmetric_unet_small", "residual_unet"]),
         ("trainer.precision=8", ["trainer.precision", "bf16-mixed", "found 8"]),
         ("dataset.batch_size=two", ["dataset.batch_size", "two", "Integer"]),
@@ -127,6 +129,30 @@ def test_a_ladder_that_cannot_stand_is_refused(folder: Path, arguments: list[str
     assert all(word in message for word in words), message
     assert not (folder / "oracle.json").exists()
     assert not (folder / "tables").exists()
+
+
+@pytest.mark.parametrize(
+    ("command", "arguments", "said"),
+    [
+        (
+            "oracle",
+            ["grid=semantickitti_10cm"],
+            "grid: expected none with a checkpoint, which has its own, found grid=",
+        ),
+        ("oracle", ["inference.roi.margin=2"], "inference.roi.margin: expected none with a checkpoint"),
+        ("predict", ["input=tree", "split=test"], "split: expected none with input, whose scans belong to no dataset"),
+        ("predict", ["input=tree", "dataset.workers=0"], "dataset.workers: expected none with input"),
+        ("predict", ["input=tree", "dataset=nuscenes"], "dataset: expected none with input"),
+        ("predict", ["scans.period=0.2"], "scans.period: expected none without input=FOLDER"),
+    ],
+)
+def test_settings_that_cannot_act_are_refused(
+    folder: Path, checkpoint: Path, command: str, arguments: list[str], said: str
+) -> None:
+    """Neither the dataset nor the folder of scans is there: it is refused before anything is looked for."""
+    message = refused(folder, command, f"checkpoint={checkpoint}", "out=out", *arguments)
+    assert said in message
+    assert not (folder / "out").exists()
 
 
 def test_a_ladder_is_not_put_up_against_a_model_of_other_classes(folder: Path, checkpoint: Path) -> None:

@@ -1,6 +1,6 @@
 import torch
 
-from most.heads import CentreHead, SemanticHead
+from most.heads import CentreHead, OffsetHead, OrientedCentreHead, SemanticHead
 
 
 def test_maps_have_a_channel_for_each_thing_and_start_at_a_tenth():
@@ -8,6 +8,12 @@ def test_maps_have_a_channel_for_each_thing_and_start_at_a_tenth():
     assert maps.heatmap.shape == (2, 3, 6, 5)
     assert torch.allclose(maps.heatmap.sigmoid(), torch.tensor(0.1), atol=1e-3)
     assert [maps.offset.shape[1], maps.height.shape[1], maps.extent.shape[1], maps.velocity.shape[1]] == [2, 1, 3, 2]
+
+
+def test_offsets_are_of_voxels_and_start_near_zero():
+    offsets = OffsetHead(channels=8).build(channels=4, num_things=3)(torch.randn(6, 4))
+    assert offsets.shape == (6, 3)
+    assert offsets.abs().max() < 0.05
 
 
 def test_refinement_is_one_linear_layer_over_the_concatenation():
@@ -26,3 +32,14 @@ def test_without_refinement_points_read_their_voxel():
     index = torch.tensor([1, 1, 0])
     voxel_logits, point_logits = head(torch.randn(2, 4), torch.randn(3, 2), torch.randn(1, 5, 1, 1), index, index * 0)
     assert torch.equal(point_logits, voxel_logits[index])
+
+
+def test_only_an_oriented_head_has_a_yaw_and_no_more_weights_than_it_needs():
+    plain, oriented = (
+        kind(channels=8).build(bev_channels=4, num_things=3) for kind in (CentreHead, OrientedCentreHead)
+    )
+    bev = torch.zeros(2, 4, 6, 5)
+    assert plain(bev).yaw is None
+    assert oriented(bev).yaw.shape == (2, 2, 6, 5)
+    assert (plain.regression.out_channels, oriented.regression.out_channels) == (8, 10)
+    assert oriented(bev).velocity.shape == (2, 2, 6, 5)

@@ -11,6 +11,8 @@ from most.ladder import NoModel
 from most.ladder.rungs import EVERYTHING, MODEL
 from most.ladder.scene import Scene, Truth
 from most.ladder.substitutions import centres, extents, point_semantics, target_maps, velocities
+from most.modal.heatmap import HeatmapTargets
+from most.panoptic import Fusion
 from most.structures import Instances, Sample
 
 CAR, OTHER_CAR, MOVING_CAR = (1 << 16) | 10, (2 << 16) | 10, (1 << 16) | 252
@@ -25,6 +27,7 @@ class Perfect:
     mistaken: tuple[int, ...] = ()
     grid = GRID
     settings = Inference()
+    targets = HeatmapTargets()
     has_model = True
 
     def __call__(self, sample: Sample, instances: Instances) -> Scene:
@@ -33,7 +36,7 @@ class Perfect:
         for substitute in (point_semantics, centres, extents, velocities):
             scene = substitute(scene, truth)
         classes = scene.evidence.semantics
-        maps = target_maps(instances, scene.evidence.bev_grid, KITTI.things)
+        maps = target_maps(instances, scene.evidence.bev_grid, KITTI.things, self.targets)
         wrong = torch.isin(classes, torch.tensor(self.mistaken, dtype=torch.long))
         return replace(scene, maps=maps, evidence=replace(scene.evidence, semantics=classes + wrong.long()))
 
@@ -52,6 +55,16 @@ def test_everything_substituted_is_the_ceiling() -> None:
     assert top["panoptic"]["pq_things"] == pytest.approx(2 / 8)
     assert top["lstq"]["lstq"] == top["lstq"]["lstq_repaired"] == 1
     assert top == rows["ceiling: its instances"]
+
+
+@pytest.mark.parametrize(("least", "found"), [(4, 1 / 8), (5, 0)])
+def test_heat_maps_are_drawn_as_the_model_learned_them(least: int, found: float) -> None:
+    """Cars of four points; a model that was taught those of five and more leaves them together, without ids."""
+    settings = Inference(fusion=Fusion(unclaimed="zero"))
+    look = replace(no_model(), settings=settings, targets=HeatmapTargets(min_points=least))
+    rows = climbed(drive([[(CAR, (0, 0, 0)), (OTHER_CAR, (8, 0, 0)), *STREET]]), look)
+    assert rows[EVERYTHING]["panoptic"]["pq_things"] == pytest.approx(1 / 8)
+    assert rows[f"{EVERYTHING}, centres by heat map"]["panoptic"]["pq_things"] == pytest.approx(found)
 
 
 def test_ids_of_two_classes_and_of_two_objects_lower_the_ceiling() -> None:

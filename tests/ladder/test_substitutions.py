@@ -18,6 +18,7 @@ from most.ladder.substitutions import (
     voxel_semantics,
 )
 from most.membership import Pairs, RegionOfInterest
+from most.modal.heatmap import HeatmapTargets
 from most.structures import Detections, Sample
 from tiny import CAR, GRID, PERSON, ROAD, TAXONOMY, labelled, street, tiny_predictor, window
 
@@ -103,7 +104,7 @@ def test_peaks_of_the_truths_heat_maps_are_its_centres_but_for_two_in_one_cell()
     """Persons 1 m apart share a cell of 4 m, and the one with more points is detected."""
     sample = street()
     scene, truth = scene_of(sample)
-    peaks = Peaks(PeakDetector(), RegionOfInterest(), TAXONOMY.things)
+    peaks = Peaks(PeakDetector(), RegionOfInterest(), TAXONOMY.things, HeatmapTargets())
     seen = peaks(scene, truth)
     found = seen.evidence.detections
     assert sorted(seen.owners.tolist()) == [0, 1]
@@ -114,4 +115,25 @@ def test_peaks_of_the_truths_heat_maps_are_its_centres_but_for_two_in_one_cell()
     crowd = labelled(places, torch.tensor([PERSON] * 3), torch.tensor([1, 1, 2]))
     scene, truth = scene_of(crowd)
     assert peaks(scene, truth).owners.tolist() == [0]
-    assert target_maps(truth.instances, scene.evidence.bev_grid, TAXONOMY.things).heatmap.sigmoid().max() == 1
+    maps = target_maps(truth.instances, scene.evidence.bev_grid, TAXONOMY.things, HeatmapTargets())
+    assert maps.heatmap.sigmoid().max() == 1
+
+
+def test_peaks_are_those_that_the_network_was_taught() -> None:
+    """Cars of 40 points each: a network that was taught those of 41 and more would detect none."""
+    scene, truth = scene_of(street())
+    for least, found in ((40, 2), (41, 0)):
+        peaks = Peaks(PeakDetector(), RegionOfInterest(), TAXONOMY.things, HeatmapTargets(min_points=least))
+        assert len(peaks(scene, truth).evidence.detections) == found
+
+
+def test_extents_come_with_yaws_where_either_knows_them() -> None:
+    scene, truth = scene_of(street())
+    given = detected(scene, (CAR, (-4.2, 3.2, -0.9)), (CAR, (0.0, 0.0, 0.0)), owners=[0, -1])
+    found = given.evidence.detections
+    assert extents(given, truth).evidence.detections.yaws is None
+    turned = replace(truth, instances=replace(truth.instances, yaws=torch.tensor([0.5, 0.7])))
+    assert extents(given, turned).evidence.detections.yaws.tolist() == [0.5, 0.0]
+    found.yaws = torch.tensor([1.0, 2.0])
+    assert extents(given, truth).evidence.detections.yaws.tolist() == [0.0, 2.0]
+    assert found.yaws.tolist() == [1.0, 2.0]

@@ -1,5 +1,6 @@
 """PointSegMLP: what it sees, and that it learns what the nearest centre gets wrong."""
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -19,7 +20,7 @@ from most.simulation.settings import SensorSettings
 from most.simulation.vehicles import car
 from most.stages.membership import MembershipStage, MembershipTraining
 from most.structures import Sample
-from tiny import CAR, TAXONOMY, enlighten, known_evidence, labelled, tiny_predictor
+from tiny import CAR, TAXONOMY, enlighten, known_evidence, labelled, street, tiny_predictor
 
 
 def touching_cars() -> Sample:
@@ -131,3 +132,16 @@ def test_without_pairs_there_is_nothing_to_rate_or_to_learn() -> None:
 def test_impossible_widths_are_refused(widths: list[int]) -> None:
     with pytest.raises(ConfigError, match=r"membership\.widths: expected at least one positive width"):
         PointSegMLPSettings(widths)
+
+
+def test_a_turned_detection_tells_where_along_it_a_point_lies() -> None:
+    """Extents 2 and 0.5 m at a right angle: 1 m along y is half of its length."""
+    evidence = known_evidence(tiny_predictor(), street())
+    found = evidence.detections
+    found.extents, found.yaws = torch.tensor([[2.0, 0.5, 1.0]] * 2), torch.tensor([math.pi / 2, 0.0])
+    evidence.points = evidence.points.clone()
+    evidence.points[0] = found.centres[0] + torch.tensor([0.0, 1.0, 0.0])
+    settings = PointSegMLPSettings([4], bev=False, point=False)
+    channels = Channels(TAXONOMY.num_classes - 1, list(TAXONOMY.things), 4, 8)
+    described = settings.build(channels).describe(evidence, Pairs(torch.tensor([0]), torch.tensor([0])))
+    assert described[0, :6].tolist() == pytest.approx([0.0, 1.0, 0.0, 0.5, 0.0, 0.0], abs=1e-5)

@@ -1,3 +1,6 @@
+import math
+from dataclasses import replace
+
 import torch
 
 from most.membership import RegionOfInterest
@@ -47,3 +50,20 @@ def test_chunks_find_what_the_whole_finds(monkeypatch):
         zip(*[value.tolist() for value in vars(parts).values()], strict=True)
     )
     assert len(whole) == len(parts)
+
+
+def test_a_region_is_turned_as_its_detection_is():
+    """A box 4 m long at 45 degrees: what lies ahead of it is in, what lies as far beside it is not."""
+    turned = replace(ONE, yaws=torch.tensor([math.pi / 4]))
+    points = torch.tensor([[1.3, 1.3, 0.0], [1.3, -1.3, 0.0], [1.9, 0.0, 0.0]])
+    roi = RegionOfInterest(margin=1.0, slack=0.0)
+    assert roi.pairs(points, torch.tensor([1, 1, 1]), turned).points.tolist() == [0]
+    assert roi.pairs(points, torch.tensor([1, 1, 1]), ONE).points.tolist() == [2]
+
+
+def test_each_of_several_regions_has_its_own_turn():
+    two = detections([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0]], [[2.0, 0.5, 1.0]] * 2, [1, 2])
+    two.yaws = torch.tensor([0.0, math.pi / 2])
+    points = torch.tensor([[1.5, 0.0, 0.0], [9.0, 1.5, 0.0], [0.0, 1.5, 0.0], [10.5, 0.0, 0.0]])
+    pairs = RegionOfInterest(margin=1.0, slack=0.0).pairs(points, torch.tensor([1, 2, 1, 2]), two)
+    assert list(zip(pairs.points.tolist(), pairs.detections.tolist(), strict=True)) == [(0, 0), (1, 1)]

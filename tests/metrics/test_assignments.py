@@ -19,15 +19,18 @@ def assignments(count: int) -> Assignments:
     return Assignments(detections, torch.rand(count, 3), torch.tensor([-1, count - 1, -1]))
 
 
+@pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("count", [0, 4])
-def test_what_is_written_is_read(tmp_path: Path, count: int) -> None:
+def test_what_is_written_is_read(tmp_path: Path, count: int, turned: bool) -> None:
     written = assignments(count)
+    written.detections.yaws = torch.rand(count) if turned else None
     path = assignments_path(tmp_path / "sequences" / "08" / "predictions" / "000123.label")
     assert path == tmp_path / "sequences" / "08" / "detections" / "000123.npz"
     write_assignments(path, written)
     found = read_assignments(path)
+    assert (found.detections.yaws is not None) == turned
     for name, value in vars(written.detections).items():
-        assert torch.equal(getattr(found.detections, name), value)
+        assert value is None or torch.equal(getattr(found.detections, name), value)
     assert torch.equal(found.roi, written.roi)
     assert torch.equal(found.assigned, written.assigned)
 
@@ -38,6 +41,10 @@ def without_roi(arrays: dict[str, np.ndarray]) -> None:
 
 def with_other_centres(arrays: dict[str, np.ndarray]) -> None:
     arrays["centres"] = arrays["centres"][:1]
+
+
+def with_too_many_yaws(arrays: dict[str, np.ndarray]) -> None:
+    arrays["yaws"] = np.zeros(3)
 
 
 def with_unknown_detection(arrays: dict[str, np.ndarray]) -> None:
@@ -53,6 +60,7 @@ def with_pickled_objects(arrays: dict[str, np.ndarray]) -> None:
     [
         (without_roi, "found no roi"),
         (with_other_centres, r"centres: expected shape \(2, 3\), found \(1, 3\)"),
+        (with_too_many_yaws, r"yaws: expected shape \(2,\), found \(3,\)"),
         (with_unknown_detection, "assigned: expected .* from -1 to 1"),
         (with_pickled_objects, "allow_pickle"),
     ],

@@ -121,7 +121,7 @@ def test_membership_accuracy_needs_all_scans_and_says_what_is_missing(cars: Tree
 def test_detections_of_another_scan_are_refused(cars: Tree) -> None:
     cars.add_scan("08", np.zeros((5, 3)))
     cars.add("08", 0, [label(CAR, 1)] * 5, [label(CAR, 1)] * 5)
-    with pytest.raises(DataError, match=r"000000\.npz: .*labels \(5\), found 6 assigned"):
+    with pytest.raises(DataError, match=r"000000\.npz: expected an entry for each of the scan's 5 points, found 6"):
         cars.evaluate("08")
 
 

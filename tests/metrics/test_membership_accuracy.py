@@ -144,3 +144,14 @@ def test_no_detection_gives_no_figure(five_points: dict) -> None:
 
 def test_counts_add() -> None:
     assert MembershipCounts(1, 2, 3, 4) + MembershipCounts(10, 20, 30, 40) == MembershipCounts(11, 22, 33, 44)
+
+
+def test_turned_regions_hold_and_match_what_lies_along_them(five_points: dict) -> None:
+    """The same five points with regions 0.05 m long and 2 m wide, then turned by a right angle."""
+    whole = membership_counts(**five_points)
+    five_points["roi"] = torch.tensor([[0.05, 2.0, 2.0]] * 2)
+    assert membership_counts(**five_points).total == 0
+    five_points["detections"].yaws = torch.full((2,), math.pi / 2)
+    assert membership_counts(**five_points) == whole
+    five_points["detections"].yaws[0] = 0.0
+    assert membership_counts(**five_points).total == 3

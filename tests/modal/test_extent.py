@@ -5,7 +5,7 @@ import torch
 
 from most.errors import ConfigError
 from most.modal.build import build_table
-from most.modal.extent import ShrinkWrap, TrackMax
+from most.modal.extent import DropSmall, ShrinkWrap, TrackMax
 
 CAR = 1 | 5 << 16
 EYE, ZERO = torch.eye(3, dtype=torch.float64), torch.zeros(3, dtype=torch.float64)
@@ -42,7 +42,14 @@ def test_track_max_knows_them_all_in_world_directions(table):
     assert extents(table, 2, TrackMax()) == [2, 1, 0.75]
 
 
-@pytest.mark.parametrize("strategy", [ShrinkWrap, TrackMax])
+@pytest.mark.parametrize("strategy", [ShrinkWrap, TrackMax, DropSmall])
 def test_a_floor_must_be_positive(strategy):
     with pytest.raises(ConfigError, match=r"extent\.floor: expected a length above 0 m, found 0"):
         strategy(floor=0.0)
+
+
+def test_drop_small_is_shrink_wrap_for_what_is_left(table):
+    for index in range(3):
+        assert extents(table, index, DropSmall()) == extents(table, index, ShrinkWrap())
+    with pytest.raises(ConfigError, match=r"extent\.min_points: expected a number of at least 1, found 0"):
+        DropSmall(min_points=0)

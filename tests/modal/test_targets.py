@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import pytest
 import torch
@@ -23,8 +24,7 @@ def instance(x, y, z=-1.0, of=CAR, points=10, extent=(2.0, 1.0, 0.5), velocity=N
 
 
 def scene(*parts):
-    names = vars(instance(0.0, 0.0))
-    return Instances(**{name: torch.cat([getattr(part, name) for part in parts]) for name in names})
+    return Instances.cat(list(parts))
 
 
 def targets(*samples, **settings):
@@ -83,3 +83,19 @@ def test_samples_without_instances():
     assert found.heatmap.sum() == 0
     assert found.cells.shape == (0, 3)
     assert found.extent.shape == (0, 3)
+
+
+def test_a_turned_box_has_sine_and_cosine_of_twice_its_yaw_and_a_heat_map_about_what_it_reaches():
+    """Half-sizes 4 and 0.5 m at a right angle: 1 cell of 0.5 m along x, 4 of 1 m along y."""
+    turned = instance(0.1, 0.5, extent=(4.0, 0.5, 1.0))
+    assert targets(turned).yaw is None
+    found = targets(replace(turned, yaws=torch.tensor([math.pi / 2])))
+    assert found.yaw[0].tolist() == pytest.approx([0.0, -1.0], abs=1e-6)
+    assert found.extent[0].tolist() == pytest.approx([math.log(4), math.log(0.5), 0])
+    assert found.heatmap[0, 0, 11, 5].item() == pytest.approx(math.exp(-1 / 2), abs=1e-5)
+    assert found.heatmap[0, 0, 10, 7].item() == pytest.approx(math.exp(-4 / (2 * 4)), abs=1e-5)
+
+
+def test_half_a_turn_asks_for_the_same():
+    one, other = (targets(replace(instance(0, 0), yaws=torch.tensor([yaw]))).yaw for yaw in (0.4, 0.4 - math.pi))
+    assert torch.allclose(one, other, atol=1e-6)

@@ -4,7 +4,7 @@ FOLDER holds the unpacked package, OUT gets the figures of its evaluation. The p
 in the devkit: that of the lidarseg task, whose results are the classes alone, is run on the package's classes.
 """
 
-import shutil
+import json
 import sys
 from pathlib import Path
 
@@ -19,7 +19,10 @@ from nuscenes.utils.data_io import load_bin_file, panoptic_to_lidarseg
 def validate(nusc, folder, split):
     """Raise AssertionError for what the server's first look would refuse."""
     results = folder.parent / "classes"
-    shutil.copytree(folder / split, results / split)
+    submission = json.loads((folder / split / "submission.json").read_text())
+    assert submission["meta"].pop("task") in ("segmentation", "tracking")  # the lidarseg task has no other
+    (results / split).mkdir(parents=True)
+    (results / split / "submission.json").write_text(json.dumps(submission))
     (results / "lidarseg" / split).mkdir(parents=True)
     for path in (folder / "panoptic" / split).iterdir():
         classes = panoptic_to_lidarseg(load_bin_file(str(path), type="panoptic"))

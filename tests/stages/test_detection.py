@@ -8,8 +8,10 @@ import torch
 
 from most.detections import PeakDetector
 from most.errors import ConfigError
+from most.heads import OffsetHead
 from most.inference import Inference, Prediction
 from most.losses import LossWeights, class_weights, focal_loss, regression_losses, semantic_loss
+from most.membership import MeanShift
 from most.modal.targets import bev_targets
 from most.stages.detection import DetectionStage, DetectionTraining, one_cycle
 from most.structures import Detections, Panoptic
@@ -19,8 +21,10 @@ from tiny import CAR, ROAD, TAXONOMY, cloud, labelled, street, tiny_predictor, w
 COUNTS = torch.arange(TAXONOMY.num_classes) * 100
 
 
-def stage(**settings):
-    made = DetectionStage(tiny_predictor(), TAXONOMY, COUNTS, DetectionTraining(**settings), {"most": {"format": 1}}, 1)
+def stage(parts=None, **settings):
+    made = DetectionStage(
+        tiny_predictor(**(parts or {})), TAXONOMY, COUNTS, DetectionTraining(**settings), {"most": {"format": 1}}, 1
+    )
     made.logged = {}
     made.log_dict = lambda values, **_: made.logged.update(values)
     return made
@@ -84,26 +88,17 @@ def test_the_total_is_the_weighted_sum():
     )
     made = stage(losses=weights)
     total = made.training_step([street()], 0)
-    apart = {name: made.logged[f"train/loss_{name}"] for name in vars(weights) if name != "class_balance"}
+    names = vars(weights).keys() - {"class_balance", "yaw"}  # these boxes have no yaw
+    apart = {name: made.logged[f"train/loss_{name}"] for name in names}
     assert total.item() == pytest.approx(sum(getattr(weights, name) * loss.item() for name, loss in apart.items()))
     assert made.logged["train/loss"] == total.detach()
     assert not any(value.requires_grad for value in made.logged.values())
 
 
 def test_a_network_learns_a_street_and_finds_its_cars():
-    settings = DetectionTraining(max_lr=0.05, weight_decay=0.0, epochs=1, batch_size=1)
     made, sample = stage(), street()
     made.predictor.settings = Inference(detector=PeakDetector(threshold=0.3))
-    optimiser, schedule = one_cycle(made.network.parameters(), settings, 30)
-    course = []
-    for _ in range(30):
-        optimiser.zero_grad()
-        loss = made.training_step([sample], 0)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(made.network.parameters(), settings.clip)
-        optimiser.step()
-        schedule.step()
-        course.append(loss.item())
+    course = learn(made, sample, 30)
     assert course[-1] < course[0] / 3
 
     made.eval()
@@ -115,6 +110,48 @@ def test_a_network_learns_a_street_and_finds_its_cars():
     assert sorted(nearest.tolist()) == [0, 1]
     votes = Counter(prediction.panoptic.semantics[:80].tolist())
     assert votes[CAR] > 70
+
+
+def learn(made, sample, steps):
+    """Train for some steps; return the losses."""
+    settings = DetectionTraining(max_lr=0.05, weight_decay=0.0, epochs=1, batch_size=1)
+    optimiser, schedule = one_cycle(made.network.parameters(), settings, steps)
+    course = []
+    for _ in range(steps):
+        optimiser.zero_grad()
+        loss = made.training_step([sample], 0)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(made.network.parameters(), settings.clip)
+        optimiser.step()
+        schedule.step()
+        course.append(loss.item())
+    return course
+
+
+def test_an_offset_network_learns_where_its_cars_are():
+    made, sample = stage({"centre_head": OffsetHead(8), "membership": MeanShift()}), street()
+    assert set(made.losses([sample], made.network([sample]))) == {"voxel", "point", "offset"}
+    learn(made, sample, 30)
+    made.eval()
+    (prediction,) = made.predict_step([sample], 0)
+    cars = TAXONOMY.instance_of(sample.labels)[:80]
+    assert prediction.panoptic.semantics[:80].eq(CAR).sum() > 70
+    votes = Counter(zip(prediction.panoptic.ids[:80].tolist(), cars.tolist(), strict=True)).most_common(2)
+    assert {car for (_, car), _ in votes} == {1, 2}
+    assert len({ours for (ours, _), _ in votes}) == 2
+    assert sum(count for _, count in votes) > 65
+    assert prediction.detections.velocities.isnan().all()
+
+
+def test_the_offset_loss_is_the_distance_over_points_with_an_instance():
+    made, first = stage({"centre_head": OffsetHead(8), "membership": MeanShift()}), street()
+    far = torch.tensor([[99.0, 0.0, 0.0]])  # of a car that the network does not see
+    second = labelled(torch.cat([far, cloud(30)]), torch.tensor([CAR] + [ROAD] * 30), torch.tensor([1] + [0] * 30))
+    output = made.network([first, second])
+    centres = first.instances.centres[TAXONOMY.instance_of(first.labels)[:80] - 1]
+    expected = (first.points[:80, :3] + output.offsets[:80] - centres).abs().sum() / 80
+    assert torch.allclose(made.losses([first, second], output)["offset"], expected)
+    assert made.losses([void()], made.network([void()]))["offset"] == 0
 
 
 def perfect(samples):

@@ -1,6 +1,6 @@
 """Observations made by hand, and a little world of things that move as they like."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -40,7 +40,13 @@ def seen(*rows: tuple[float, ...], thing: int = CAR, scores: list[float] | None 
         velocities=torch.where(known[:, None], table[:, 2:], 0.0),
         velocity_known=known,
         scores=torch.tensor(scores if scores is not None else [0.5] * len(rows)),
+        placed=torch.ones_like(known),
     )
+
+
+def nowhere(count: int, thing: int = CAR) -> Observations:
+    """Observations of one class without a finite point."""
+    return replace(seen(*[(0, 0)] * count, thing=thing), placed=torch.zeros(count, dtype=torch.bool))
 
 
 def both(first: Observations, second: Observations) -> Observations:
@@ -90,4 +96,5 @@ class World:
             velocities=(self.velocities @ where[:3, :3])[:, :2].float(),
             velocity_known=self.known,
             scores=self.scores,
+            placed=torch.ones_like(self.known),
         )

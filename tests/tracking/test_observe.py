@@ -1,5 +1,8 @@
 """What a tracker is told of a sweep's labels, and how its identities come back to the points."""
 
+import math
+from dataclasses import replace
+
 import torch
 
 from most.structures import Detections, Panoptic
@@ -42,7 +45,7 @@ def test_segments_that_a_detection_claims_take_what_it_says():
 
 
 def test_the_detection_that_claims_most_counts():
-    two = Detections(**{name: torch.cat([value[1:], value[1:]]) for name, value in vars(FOUND).items()})
+    two = Detections.cat([FOUND.select(torch.tensor([1]))] * 2)
     two.scores = torch.tensor([0.8, 0.7])
     claimed = torch.tensor([0, 1, 1, -1, -1, -1, -1, -1])
     assert torch.allclose(observe(POINTS, LABELS, THINGS, two, claimed).observations.scores[0], torch.tensor(0.7))
@@ -63,6 +66,15 @@ def test_points_that_are_not_finite_count_for_nothing():
     seen = observe(points, LABELS, THINGS).observations
     assert torch.allclose(seen.centres, torch.tensor([[0.5, 1.5, 0.5], [11, 0, 0], [0, 0, 0]]))
     assert seen.extents.isfinite().all()
+    assert seen.placed.tolist() == [True, True, False]
+
+
+def test_what_a_detection_claims_is_somewhere_even_without_a_finite_point():
+    points = POINTS.clone()
+    points[5] = torch.nan
+    seen = observe(points, LABELS, THINGS, FOUND, torch.where(LABELS.semantics == PERSON, 0, -1)).observations
+    assert seen.placed.all()
+    assert torch.equal(seen.centres[2], FOUND.centres[0])
 
 
 def test_a_sweep_without_things_has_no_segments():
@@ -70,3 +82,10 @@ def test_a_sweep_without_things_has_no_segments():
     assert (len(nothing.observations), nothing.rename(LABELS.ids[:0]).tolist()) == (0, [])
     road = observe(POINTS[:1], Panoptic(torch.tensor([ROAD]), torch.tensor([3])), THINGS)
     assert (len(road.observations), road.rename(LABELS.ids[:0]).tolist()) == (0, [0])
+
+
+def test_a_turned_detection_lends_what_it_reaches_along_the_axes():
+    claimed = torch.tensor([-1, -1, -1, 1, 1, -1, -1, -1])
+    turned = replace(FOUND, yaws=torch.tensor([0.0, math.pi / 2]))
+    seen = observe(POINTS, LABELS, THINGS, turned, claimed).observations
+    assert torch.allclose(seen.extents[1], torch.tensor([1.0, 2.0, 0.8]), atol=1e-6)

@@ -4,7 +4,7 @@ import math
 
 import pytest
 import torch
-from scenes import CAR, OPTIONS, PERSON, both, named, pose, seen, tracker
+from scenes import CAR, OPTIONS, PERSON, both, named, nowhere, pose, seen, tracker
 
 from most.errors import ConfigError, DataError
 from most.tracking import ConstantVelocity, TrackerSettings
@@ -133,6 +133,25 @@ def test_what_is_not_finite_is_refused_and_changes_nothing():
     with pytest.raises(DataError, match="expected finite centres and velocities"):
         following.step(seen((0, 0, math.inf, 0)), pose(), 0.0)
     assert following.step(seen((0, 0)), pose(), 0.0).tolist() == [1]
+
+
+@every_option
+def test_what_is_nowhere_gets_a_number_and_no_track(settings):
+    """Neither does it go on with a car at the sensor, nor does the next car there go on with it."""
+    following, car = tracker(settings), seen((0, 0))
+    said = [
+        following.step(observed, None, 0.1 * index).tolist()
+        for index, observed in enumerate([nowhere(1), car, both(nowhere(2), car), nowhere(1)])
+    ]
+    assert said == [[1], [2], [3, 4, 2], [5]]
+    assert following.tracks().ids.tolist() == [2]
+
+
+def test_numbers_of_what_is_nowhere_are_used_again():
+    following = tracker(largest=3)
+    following.step(seen((0, 0)), None, 0.0)
+    said = [following.step(both(seen((0, 0)), nowhere(1)), None, 0.1 * index).tolist() for index in range(1, 5)]
+    assert said == [[1, 2], [1, 3], [1, 2], [1, 3]]
 
 
 def test_numbers_stay_within_a_class_or_a_sequence():

@@ -28,7 +28,7 @@ def crowd(generator):
     scores = (rand[:, 0] * 3).round() / 3
     return Observations(
         1 + (rand[:, 1] > 0.5).long(), rand[:, 2:5] * 12, torch.ones(count, 3), rand[:, 5:7] * 4 - 2, rand[:, 7] > 0.5,
-        scores,
+        scores, torch.rand(count, generator=generator) > 0.1,
     )  # fmt: skip
 
 

@@ -1,7 +1,9 @@
 import pytest
 import torch
+from matplotlib.collections import PatchCollection
 from matplotlib.image import imread
 
+from most.geometry.boxes import along
 from most.structures import Detections, Instances, Panoptic
 from most.viz.bev import draw_bev, save
 
@@ -74,9 +76,10 @@ def test_a_scan_without_points_things_or_detections(prediction, detections):
 
 
 def test_the_inputs_are_left_as_they_are(truth, prediction, detections, instances):
-    before = [tensor.clone() for part in (truth, prediction, detections, instances) for tensor in vars(part).values()]
+    inputs = (truth, prediction, detections, instances)
+    before = [tensor.clone() for part in inputs for tensor in vars(part).values() if tensor is not None]
     draw_bev(POINTS, truth, prediction, detections, instances, NAMES, COLOURS, THINGS)
-    after = [tensor for part in (truth, prediction, detections, instances) for tensor in vars(part).values()]
+    after = [tensor for part in inputs for tensor in vars(part).values() if tensor is not None]
     assert all(torch.equal(one, other) for one, other in zip(before, after, strict=True))
 
 
@@ -86,3 +89,17 @@ def test_it_is_saved_as_a_png_that_can_be_read(tmp_path, prediction, detections)
     save(figure, path)
     assert imread(path).shape[1] > 1000
     assert [file.name for file in path.parent.iterdir()] == ["bev.png"]
+
+
+def test_a_turned_box_is_drawn_turned(prediction, detections):
+    """One 4 m long and 2 m wide that looks to the left of ahead: its front left corner is (x, y) = (2, 0) turned."""
+    turned = detections.select(torch.tensor([0]))
+    turned.extents, turned.yaws = torch.tensor([[2.0, 1.0, 1.0]]), torch.tensor([0.6])
+    figure = draw_bev(POINTS, None, prediction, turned, None, NAMES, COLOURS, THINGS)
+    (boxes,) = (one for one in figure.axes[0].collections if isinstance(one, PatchCollection))
+    (path,) = boxes.get_paths()
+    corners = torch.tensor([[2.0, 1, 0], [2, -1, 0], [-2, 1, 0], [-2, -1, 0]])
+    expected = along(corners, torch.full((4,), -0.6))[:, :2] + turned.centres[0, :2]
+    drawn = torch.tensor(path.vertices[:4, ::-1].copy()).float()  # y, x
+    assert torch.cdist(drawn, expected).amin(1).max() < 1e-4
+    assert torch.cdist(expected, drawn).amin(1).max() < 1e-4

@@ -62,11 +62,11 @@ def write_labels_only(folder: Path, reader: SemanticKITTI, scans: range, name: s
         reader.write_prediction(reader.prediction_path(folder, frame), reader.taxonomy.encode(semantics, ids))
 
 
-def write_detections(folder: Path, reader: SemanticKITTI, index: int) -> None:
+def write_detections(folder: Path, reader: SemanticKITTI, index: int, yaws: torch.Tensor | None = None) -> None:
     """One detection of the moving car, which claims its points and one of the other's, and one that claims none."""
     found = Detections(
         torch.tensor([1, 6]), torch.tensor([0.9, 0.3]), torch.tensor([[5.0, 1, 0], [9, 9, 0]]),
-        torch.tensor([[2.0, 1, 0.5], [0.5, 0.5, 1]]), torch.tensor([[0.0, 3], [0.1, 0]]),
+        torch.tensor([[2.0, 1, 0.5], [0.5, 0.5, 1]]), torch.tensor([[0.0, 3], [0.1, 0]]), yaws,
     )  # fmt: skip
     claims = torch.full((len(world_points(index)[0]),), -1)
     claims[:5] = 0
@@ -168,6 +168,14 @@ def test_detections_beside_the_labels_are_shown_in_the_colours_of_what_they_clai
     assert boxes["colors"] == [shown("prediction/sensor/tracks", 1)["colors"][0], 0xFFFFFFFF]
     assert arrows["vectors"] == [[0, 3, 0]]  # the other one is as good as still
     assert arrows["origins"] == [[5, 1, 0]]
+
+
+def test_turned_detections_are_shown_turned(tree):
+    reader = SemanticKITTI(tree / "tree")
+    for index in range(3):
+        write_detections(tree / "predictions", reader, index, torch.tensor([np.pi / 2, 0.0]).float())
+    turns = recorded(tree)("prediction/sensor/boxes", 1)["quaternions"]
+    np.testing.assert_allclose(turns, [[0, 0, 0.5**0.5, 0.5**0.5], [0, 0, 0, 1]], atol=1e-6)
 
 
 def test_a_sequence_without_labels_shows_the_prediction_alone(tree):

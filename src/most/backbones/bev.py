@@ -17,7 +17,8 @@ from most.sparse import SparseTensor
 class BevBranch(nn.Module):
     """Flatten the height, convolve in the plane, and add what was found to the voxels it came from."""
 
-    def __init__(self, voxel_channels: int, height: int, bev_channels: int, squeeze: bool) -> None:
+    def __init__(self, voxel_channels: int, height: int, bev_channels: int, squeeze: bool, back: bool = True) -> None:
+        """``back``: what is found is added to the voxels, for a decoder."""
         super().__init__()
         self.height = height  # layers of the bottleneck's grid
         stacked = voxel_channels * height
@@ -29,7 +30,7 @@ class BevBranch(nn.Module):
             nn.Conv2d(bev_channels, bev_channels, 3, padding=1, bias=False),
             NormReLU(bev_channels),
         )
-        self.back = nn.Linear(bev_channels, voxel_channels)
+        self.back = nn.Linear(bev_channels, voxel_channels) if back else None
 
     def forward(self, x: SparseTensor) -> tuple[SparseTensor, Float[Tensor, "batch bev x y"]]:
         """Return the voxels with the BEV features of their column added, and the BEV map."""
@@ -39,6 +40,8 @@ class BevBranch(nn.Module):
         stack = self._stack(x, len(columns), column)
         spread = self.convs[0](stack, columns, (x.sites.batch_size, size_x, size_y))
         bev: Tensor = self.convs[1:](spread)
+        if self.back is None:
+            return x, bev
         batch, cell_x, cell_y = columns.unbind(1)
         found = self.back(bev.permute(0, 2, 3, 1)[batch, cell_x, cell_y])
         return x.with_features(x.features + found[column]), bev

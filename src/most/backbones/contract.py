@@ -19,7 +19,7 @@ class BackboneFeatures:
 class Backbone(nn.Module):
     """A network from the features of occupied voxels to features of the same voxels and of a bird's-eye view."""
 
-    voxel_channels: int
+    voxel_channels: int  # 0 where it has no decoder
     bev_channels: int
     bev_stride: int  # voxels along the side of a BEV cell; the map has ceil(size / stride) cells along an axis
 

@@ -19,6 +19,7 @@ class UNetSettings:
     down_kernel: int = 3  # 3: overlapping windows, the occupied part grows; 2: tiles, half the cost
     bev_channels: int = 128
     bev_squeeze: bool = False  # squeeze columns to bev_channels, sparsely, before the dense convolutions
+    separate: bool = False  # a network of its own, encoder and all, for detection ("w/o sharing", Table I)
 
     def __post_init__(self) -> None:
         if len(self.widths) != 4 or min(self.widths) < 1:
@@ -30,8 +31,11 @@ class UNetSettings:
         if self.bev_channels < 1:
             raise ConfigError(f"backbone.bev_channels: expected at least 1, found {self.bev_channels}")
 
-    def build(self, in_channels: int, grid_shape: tuple[int, int, int]) -> Backbone:
-        """Make the network for features of ``in_channels`` on a grid of ``grid_shape`` (x, y, z) voxels."""
+    def build(self, in_channels: int, grid_shape: tuple[int, int, int], decoder: bool = True) -> Backbone:
+        """Make the network for features of ``in_channels`` on a grid of ``grid_shape`` (x, y, z) voxels.
+
+        Without a ``decoder`` it gives the bird's-eye view alone.
+        """
         height = -(-grid_shape[2] // 2 ** (len(self.widths) - 1))
         return UNet(
             in_channels,
@@ -41,6 +45,7 @@ class UNetSettings:
             height,
             self.bev_channels,
             self.bev_squeeze,
+            decoder,
         )
 
 

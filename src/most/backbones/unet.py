@@ -22,14 +22,17 @@ class UNet(Backbone):
         bottleneck_height: int,
         bev_channels: int,
         bev_squeeze: bool,
+        decoder: bool,
     ) -> None:
         super().__init__()
-        self.voxel_channels, self.bev_channels, self.bev_stride = widths[0], bev_channels, 2 ** (len(widths) - 1)
+        self.voxel_channels = widths[0] if decoder else 0
+        self.bev_channels, self.bev_stride = bev_channels, 2 ** (len(widths) - 1)
         steps = list(itertools.pairwise(widths))
         self.stem = block(in_channels, widths[0])
         self.down = nn.ModuleList(Down(fine, coarse, down_kernel, block) for fine, coarse in steps)
-        self.bev = BevBranch(widths[-1], bottleneck_height, bev_channels, bev_squeeze)
-        self.up = nn.ModuleList(Up(coarse, fine, down_kernel, block) for fine, coarse in reversed(steps))
+        self.bev = BevBranch(widths[-1], bottleneck_height, bev_channels, bev_squeeze, back=decoder)
+        ups = reversed(steps) if decoder else ()
+        self.up = nn.ModuleList(Up(coarse, fine, down_kernel, block) for fine, coarse in ups)
 
     def forward(self, x: SparseTensor) -> BackboneFeatures:
         """Encode, look from above, decode."""
@@ -39,4 +42,4 @@ class UNet(Backbone):
         y, bev = self.bev(levels.pop())
         for up in self.up:
             y = up(y, levels.pop())
-        return BackboneFeatures(voxels=y.features, bev=bev)
+        return BackboneFeatures(voxels=y.features if self.up else x.features[:, :0], bev=bev)

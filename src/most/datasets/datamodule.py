@@ -13,7 +13,7 @@ from most.datasets.reader import Reader
 from most.datasets.sampler import EpochSampler, OrderedSampler
 from most.datasets.semantickitti import SemanticKITTI
 from most.datasets.settings import DatasetSettings
-from most.modal.instances import ExtentStrategy
+from most.modal.instances import Extent
 from most.structures import Sample
 
 
@@ -36,7 +36,7 @@ class SweepDataModule(L.LightningDataModule):
 
     reader: Reader
 
-    def __init__(self, settings: DatasetSettings, augment: Augment, extent: ExtentStrategy, seed: int = 0) -> None:
+    def __init__(self, settings: DatasetSettings, augment: Augment, extent: Extent, seed: int = 0) -> None:
         """``extent`` says how large instances are; ``seed`` fixes order and augmentation."""
         super().__init__()
         self.settings = settings
@@ -60,6 +60,7 @@ class SweepDataModule(L.LightningDataModule):
 
     def train_dataloader(self) -> DataLoader[Sample]:
         """Shuffled, augmented windows, from where the trainer stands on."""
+        self.instances.learn()
         dataset = self.dataset("train", self.augment)
         epoch, batches = standing(self.trainer) if self.trainer else (0, 0)
         sampler = EpochSampler(dataset, self.seed, epoch, batches * self.training_batch)

@@ -11,6 +11,7 @@ from jaxtyping import Float64, Int64
 from torch import Tensor
 
 from most.datasets.taxonomy import Taxonomy
+from most.modal.boxes import SequenceBoxes
 from most.structures import Sweep
 
 SPLITS = ("train", "val", "test")
@@ -50,7 +51,11 @@ class Reader(Protocol):
         ...
 
     def key_frames(self, sequence: str) -> list[Frame]:
-        """The sweeps of one sequence that the dataset annotates, by number."""
+        """The sweeps of one sequence that are trained on, predicted and scored, by number; all of them annotated."""
+        ...
+
+    def annotated(self, sequence: str) -> list[Frame]:
+        """The sweeps of one sequence that the dataset annotates, by number: what instance tables are made of."""
         ...
 
     def frames_of(self, sequence: str) -> list[Frame]:
@@ -75,6 +80,14 @@ class Reader(Protocol):
 
     def sources(self, sequence: str) -> tuple[list[Path], list[Path]]:
         """Files that the sequence's labelled sweeps are made of: large ones, and small ones of this sequence alone."""
+        ...
+
+    def box_files(self, sequence: str) -> list[Path]:
+        """Files that hold the amodal boxes of the sequence's things; none where it has no boxes."""
+        ...
+
+    def sequence_boxes(self, sequence: str) -> SequenceBoxes:
+        """Read the amodal boxes in all of the sequence's key frames."""
         ...
 
     def num_points(self, frame: Frame) -> int:

@@ -10,13 +10,15 @@ from pathlib import Path
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
+from most.datasets.kitti_boxes import read_boxes
 from most.datasets.kitti_files import count_points, read_poses, read_scan, read_times
 from most.datasets.labels import read_labels, write_labels
 from most.datasets.reader import SPLITS, Frame
 from most.datasets.settings import DatasetSettings
 from most.datasets.splits import check_once, check_split, present_sequences
 from most.datasets.taxonomy import Taxonomy
-from most.errors import ConfigError, DataError
+from most.errors import ConfigError, DataError, check_entries
+from most.modal.boxes import SequenceBoxes
 from most.structures import Sweep
 
 
@@ -46,10 +48,16 @@ class SemanticKITTISettings(DatasetSettings):
 
     root: str = "data/semantickitti"  # holds sequences/
     splits: Splits = field(default_factory=Splits)
+    key_every: int = 1  # every n-th scan is a key frame: 5 makes of ten scans a second a dataset of two
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.key_every < 1:
+            raise ConfigError(f"dataset.key_every: expected at least 1, found {self.key_every}")
 
     def official_reader(self) -> "SemanticKITTI":
         """Make the reader of the tree."""
-        return SemanticKITTI(self.root, self.splits)
+        return SemanticKITTI(self.root, self.splits, self.key_every)
 
 
 class SemanticKITTI:
@@ -57,9 +65,10 @@ class SemanticKITTI:
 
     max_gap = 0.35  # s; scans are 0.1 s apart
 
-    def __init__(self, root: str | Path, splits: Splits | None = None) -> None:
+    def __init__(self, root: str | Path, splits: Splits | None = None, key_every: int = 1) -> None:
+        """``key_every`` 5 makes a key frame of scans 0, 5, 10, ..."""
         self.root = self.place = Path(root).expanduser()
-        self.splits = splits or Splits()
+        self.splits, self.key_every = splits or Splits(), key_every
         self.taxonomy = Taxonomy.load("semantickitti")
         self._poses: dict[str, Tensor] = {}
         self._times: dict[str, Tensor] = {}
@@ -89,15 +98,19 @@ class SemanticKITTI:
         return present
 
     def frames(self, split: str) -> list[Frame]:
-        """All scans of a split."""
+        """The key frames of a split."""
         return [frame for sequence in self.sequences(split) for frame in self.key_frames(sequence)]
 
     def labelled_frames(self, split: str) -> list[Frame]:
-        """All frames of a split that have a label file; for scoring, which needs no scans."""
-        return [frame for name in self.sequences(split) for frame in self._list(name, "labels", "label")]
+        """All key frames of a split that have a label file; for scoring, which needs no scans."""
+        return [frame for name in self.sequences(split) for frame in self._keys(self._list(name, "labels", "label"))]
 
     def key_frames(self, sequence: str) -> list[Frame]:
-        """All scans of a sequence: each of them is annotated."""
+        """The scans of a sequence that are trained on, predicted and scored: all, or every ``key_every``-th."""
+        return self._keys(self.frames_of(sequence))
+
+    def annotated(self, sequence: str) -> list[Frame]:
+        """All scans of a sequence: each of them has labels."""
         return self.frames_of(sequence)
 
     def frames_of(self, sequence: str) -> list[Frame]:
@@ -112,11 +125,8 @@ class SemanticKITTI:
         """Read a scan with its pose, time and labels; non-finite points stay, since every point needs a label."""
         points = read_scan(self._scan_path(frame))
         labels = self.labels(frame) if self.has_labels(frame.sequence) else None
-        if labels is not None and len(labels) != len(points):
-            raise DataError(
-                f"{self._label_path(frame)}: expected a label for each of the scan's {len(points)} points, "
-                f"found {len(labels)}; scan and labels are of different releases or one is cut off"
-            )
+        if labels is not None:
+            check_entries(self._label_path(frame), len(labels), len(points))
         pose, time = self.pose(frame), self._row(self.times(frame.sequence), frame, "times.txt")
         return Sweep(frame.sequence, frame.index, points, pose, float(time), labels)
 
@@ -151,6 +161,15 @@ class SemanticKITTI:
                 raise DataError(f"{path}: expected a file beside the sequence's {len(frames)} scans, found none")
         return scans + labels, texts
 
+    def box_files(self, sequence: str) -> list[Path]:
+        """``boxes.npz``, which simulated sequences alone have."""
+        path = self.folder(sequence) / "boxes.npz"
+        return [path] if path.is_file() else []
+
+    def sequence_boxes(self, sequence: str) -> SequenceBoxes:
+        """The boxes of a simulated sequence; instances know theirs by their number."""
+        return read_boxes(self.folder(sequence) / "boxes.npz", self.poses(sequence), self.taxonomy)
+
     def num_points(self, frame: Frame) -> int:
         """How many points a scan has."""
         return count_points(self._scan_path(frame))
@@ -170,6 +189,9 @@ class SemanticKITTI:
     def submission_notes(self, frames: list[Frame]) -> dict[str, bytes]:
         """Nothing: the server takes labels alone."""
         return {}
+
+    def _keys(self, frames: list[Frame]) -> list[Frame]:
+        return [frame for frame in frames if frame.index % self.key_every == 0]
 
     def _scan_path(self, frame: Frame) -> Path:
         return self.folder(frame.sequence) / "velodyne" / f"{_stem(frame)}.bin"

@@ -44,6 +44,11 @@ class LabelCode:
     step: int  # instance numbers are smaller; class ids too, where they are the low part
     unique_in: str  # "class" or "sequence": what two tracks must share for their numbers to differ
 
+    @property
+    def largest(self) -> int:
+        """The largest number of an instance."""
+        return self.step - 1
+
     def class_of(self, label: Int64[Tensor, "*points"]) -> Int64[Tensor, "*points"]:
         """The class id in a label."""
         return label // self.step if self.high == "class" else label % self.step
@@ -73,6 +78,7 @@ class Taxonomy:
     label: LabelCode
     predicted_as: str  # which id a submission holds: "raw", the first of the class's raw ids, or "training"
     gates: list[float]  # m in half a second that a tracker may miss a thing of the class by; 0 where it is none
+    boxes: list[list[float]]  # usual length and width, m; of things alone
     evaluator: str  # whose 4D figures: "semantickitti" (LSTQ) or "nuscenes" (PAT, PTQ, TQ, and LSTQ in its version)
 
     @staticmethod
@@ -102,6 +108,7 @@ class Taxonomy:
             label=LabelCode(*(content["label"][key] for key in ("high", "step", "unique_in"))),
             predicted_as=content["predicted_as"],
             gates=[float(entry.get("gate", 0)) for entry in classes],
+            boxes=[[float(side) for side in entry.get("box", [])] for entry in classes],
             evaluator=content["evaluator"],
         )
 
@@ -124,7 +131,7 @@ class Taxonomy:
         if ids.numel() and int(ids.min()) < 0:
             raise DataError(f"instance ids: expected numbers >= 0, found {int(ids.min())}")
         if ids.numel() and int(ids.max()) >= self.label.step:
-            ids = fit_numbers(semantics, ids, self.label.step - 1)
+            ids = fit_numbers(semantics, ids, self.label.largest)
         return self.label.join(self._written_ids.to(semantics.device)[semantics], ids)
 
     def decode(self, labels: Int64[Tensor, "*points"], source: object = "labels") -> Int64[Tensor, "*points"]:
@@ -215,7 +222,7 @@ def check_content(path: Path, content: Any) -> None:
 def check_class(where: str, index: int, entry: Any, table_size: int) -> None:
     """Raise a DataError unless ``entry`` describes one class; the first one, and no other, is void."""
     keys = ["name", "kind", "raw", "colour"]
-    keys += ["gate"] if isinstance(entry, dict) and entry.get("kind") == "thing" else []
+    keys += ["gate", "box"] if isinstance(entry, dict) and entry.get("kind") == "thing" else []
     if not isinstance(entry, dict) or set(entry) != set(keys):
         raise DataError(f"{where}: expected the keys {', '.join(keys)}, found {entry!r}")
     if entry["kind"] not in KINDS or (entry["kind"] == "void") != (index == 0):
@@ -224,8 +231,17 @@ def check_class(where: str, index: int, entry: Any, table_size: int) -> None:
         raise DataError(f"{where}.raw: expected ids in 0..{table_size - 1}, found {entry['raw']!r}")
     if not is_integers(entry["colour"], 256) or len(entry["colour"]) != 3:
         raise DataError(f"{where}.colour: expected three numbers in 0..255, found {entry['colour']!r}")
-    if "gate" in entry and not (isinstance(entry["gate"], int | float) and 0 < entry["gate"] < math.inf):
+    if entry["kind"] != "thing":
+        return
+    if not is_length(entry["gate"]):
         raise DataError(f"{where}.gate: expected metres above 0, found {entry['gate']!r}")
+    if not (isinstance(entry["box"], list) and len(entry["box"]) == 2 and all(map(is_length, entry["box"]))):
+        raise DataError(f"{where}.box: expected length and width, metres above 0, found {entry['box']!r}")
+
+
+def is_length(value: Any) -> bool:
+    """Whether ``value`` is a positive number."""
+    return isinstance(value, int | float) and 0 < value < math.inf
 
 
 def is_integers(value: Any, end: int) -> bool:

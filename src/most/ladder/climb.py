@@ -41,11 +41,11 @@ class Ladder:
         tracker: TrackerSettings,
         device: torch.device | str = "cpu",
     ) -> None:
-        """``device`` is the model's."""
+        """Everything but tracking and scoring happens on ``device``, where a model must be."""
         self.taxonomy, self.instances, self.look, self.device = taxonomy, instances, look, torch.device(device)
         self.ceilings: list[Ceiling] = ceilings(self.taxonomy)
         settings = look.settings
-        peaks = Peaks(settings.detector, settings.roi, list(self.taxonomy.things))
+        peaks = Peaks(settings.detector, settings.roi, list(self.taxonomy.things), look.targets)
         self.climbers = [Climber(rung, self.taxonomy, settings, tracker) for rung in rungs(look.has_model, peaks)]
 
     def add(self, window: Window) -> None:
@@ -86,8 +86,7 @@ class Climber:
         """Return the labels as a submission holds them, numbered by tracks."""
         things, evidence = list(self.taxonomy.things), scene.evidence
         found = fuse(evidence, things, scene.membership, self.settings.roi, self.settings.fusion).to("cpu")
-        points, detections = evidence.points.cpu(), evidence.detections.to("cpu")
-        segments = observe(points, found.panoptic, things, detections, found.claimed)
+        segments = observe(evidence.points.cpu(), found.panoptic, things, found.detections, found.claimed)
         with named(f"{sweep.sequence}, scan {sweep.index}"):
             numbers = self.tracker.step(segments.observations, sweep.pose, sweep.time)
         return self.taxonomy.encode(found.panoptic.semantics, segments.rename(numbers))

@@ -1,6 +1,6 @@
 """What is seen of a sweep before anything is substituted: a model's evidence, or nothing."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 import torch
@@ -8,6 +8,7 @@ import torch
 from most.inference import Inference, Predictor
 from most.ladder.scene import Scene
 from most.membership import Evidence, Nearest, match_detections
+from most.modal.heatmap import HeatmapTargets
 from most.structures import Detections, Instances, Sample
 from most.voxels import Grid
 
@@ -30,6 +31,11 @@ class Look(Protocol):
         """How detections and points become labels."""
         ...
 
+    @property
+    def targets(self) -> HeatmapTargets:
+        """How the truth's heat maps are drawn."""
+        ...
+
     def __call__(self, sample: Sample, instances: Instances) -> Scene:
         """Return what is seen of the current sweep, which has these instances."""
         ...
@@ -40,6 +46,7 @@ class ModelLook:
     """The model as it is; the network runs once a sweep, however many rungs there are."""
 
     predictor: Predictor
+    targets: HeatmapTargets = field(default_factory=HeatmapTargets)  # that it was trained with
 
     has_model = True
 
@@ -68,6 +75,7 @@ class NoModel:
     grid: Grid
     settings: Inference
     num_classes: int  # with void
+    targets: HeatmapTargets = field(default_factory=HeatmapTargets)
 
     has_model = False
 
@@ -77,7 +85,7 @@ class NoModel:
 
     def _nothing(self, sample: Sample) -> Evidence:
         points, grid = sample.points[: sample.num_current, :3], self.grid.bev(BEV_STRIDE)
-        void, rows = torch.zeros(len(points), dtype=torch.long), points[:0]
+        void = points.new_zeros(len(points), dtype=torch.long)
         return Evidence(
             points=points,
             semantics=void,
@@ -85,5 +93,5 @@ class NoModel:
             point_features=points.new_zeros(len(points), 0),
             bev=points.new_zeros(0, *grid.shape),
             bev_grid=grid,
-            detections=Detections(void[:0], rows[:, 0], rows, rows, rows[:, :2]),
+            detections=Detections.none(points),
         )

@@ -7,9 +7,8 @@ from jaxtyping import Int64
 from torch import Tensor
 
 from most.datasets.taxonomy import Taxonomy
-from most.membership import Evidence
+from most.membership import Evidence, Membership
 from most.modal.voxel_labels import majority
-from most.panoptic import Membership
 from most.structures import BevMaps, Instances, Sample
 from most.voxels import Grid, nearest_voxel, voxelise
 

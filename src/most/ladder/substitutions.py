@@ -14,7 +14,7 @@ from torch import Tensor
 
 from most.detections import PeakDetector, decode
 from most.ladder.scene import Scene, Truth
-from most.membership import Evidence, Pairs, RegionOfInterest, match_detections, pair_targets
+from most.membership import Evidence, Pairs, Rating, RegionOfInterest, match_detections, pair_targets
 from most.modal.heatmap import HeatmapTargets
 from most.modal.targets import bev_targets
 from most.structures import BevMaps, Detections, Instances
@@ -56,16 +56,24 @@ def centres(scene: Scene, truth: Truth) -> Scene:
     if scene.maps is not None:
         grid = scene.evidence.bev_grid
         x, y = _cells(instances.centres, grid).unbind(1)
-        _, found.extents, found.velocities = decode(scene.maps, x, y, grid)
+        _, found.extents, found.velocities, found.yaws = decode(scene.maps, x, y, grid)
     owners = torch.arange(len(instances), device=found.classes.device)
     return replace(scene, evidence=replace(scene.evidence, detections=found), owners=owners)
 
 
 def extents(scene: Scene, truth: Truth) -> Scene:
-    """Detections that stand for an instance have its extent."""
-    found, known = scene.evidence.detections, scene.owners >= 0
-    values = truth.instances.extents[scene.owners[known]]
-    return _detected(scene, replace(found, extents=found.extents.clone().index_put_((known,), values)))
+    """Detections that stand for an instance have its extent, and its yaw where boxes are turned."""
+    found, known, true = scene.evidence.detections, scene.owners >= 0, truth.instances
+    values = found.extents.clone().index_put_((known,), true.extents[scene.owners[known]])
+    yaws = None
+    if found.yaws is not None or true.yaws is not None:
+        right = _yaws(true)[scene.owners[known]]
+        yaws = _yaws(found).clone().index_put_((known,), right)
+    return _detected(scene, replace(found, extents=values, yaws=yaws))
+
+
+def _yaws(boxes: Detections | Instances) -> Float[Tensor, "boxes"]:
+    return torch.zeros_like(boxes.extents[:, 0]) if boxes.yaws is None else boxes.yaws
 
 
 def velocities(scene: Scene, truth: Truth) -> Scene:
@@ -86,7 +94,7 @@ def membership(scene: Scene, truth: Truth) -> Scene:
 
 
 @dataclass
-class TrueMembership:
+class TrueMembership(Rating):
     """Y_mem instead of O_mem (paper, Eq. 3)."""
 
     truth: Truth
@@ -105,18 +113,20 @@ class Peaks:
     detector: PeakDetector
     roi: RegionOfInterest
     things: list[int]
+    targets: HeatmapTargets  # how the network's were drawn
 
     def __call__(self, scene: Scene, truth: Truth) -> Scene:
         """Detect; centres, extents and velocities are the targets in the peaks' cells."""
         grid = scene.evidence.bev_grid
-        (found,) = self.detector(target_maps(truth.instances, grid, self.things), self.things, grid)
+        maps = target_maps(truth.instances, grid, self.things, self.targets)
+        (found,) = self.detector(maps, self.things, grid)
         owners = match_detections(found, self.roi.half_sizes(found.extents), truth.instances)
         return replace(scene, evidence=replace(scene.evidence, detections=found), owners=owners)
 
 
-def target_maps(instances: Instances, grid: BevGrid, things: list[int]) -> BevMaps:
+def target_maps(instances: Instances, grid: BevGrid, things: list[int], settings: HeatmapTargets) -> BevMaps:
     """Return the targets of one window as a network without error would write them."""
-    targets = bev_targets([instances], grid.lower, grid.cell, grid.shape, things, HeatmapTargets())
+    targets = bev_targets([instances], grid.lower, grid.cell, grid.shape, things, settings)
     _, x, y = targets.cells.unbind(1)
 
     def spread(values: Float[Tensor, "centres channels"]) -> Float[Tensor, "1 channels x y"]:
@@ -125,7 +135,8 @@ def target_maps(instances: Instances, grid: BevGrid, things: list[int]) -> BevMa
         return maps
 
     regressed = (targets.offset, targets.height, targets.extent, targets.velocity)
-    return BevMaps(targets.heatmap.logit(), *map(spread, regressed))
+    turned = () if targets.yaw is None else (targets.yaw,)
+    return BevMaps(targets.heatmap.logit(), *map(spread, regressed + turned))
 
 
 def _cells(places: Float[Tensor, "places 3"], grid: BevGrid) -> Int64[Tensor, "places 2"]:

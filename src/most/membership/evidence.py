@@ -1,6 +1,6 @@
 """What stage 1 says of one sweep, as far as a membership may look at it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import torch.nn.functional as F
 from jaxtyping import Float, Int64
@@ -18,6 +18,7 @@ class Channels:
     things: list[int]  # class ids
     point: int  # F_point
     bev: int  # F_bev
+    boxes: list[list[float]] = field(default_factory=list)  # usual length and width of each of the things, m
 
 
 @dataclass
@@ -31,6 +32,7 @@ class Evidence(OnDevice):
     bev: Float[Tensor, "bev_channels x y"]  # F_bev
     bev_grid: BevGrid
     detections: Detections
+    offsets: Float[Tensor, "points 3"] | None = None  # to the instance's modal centre, m; None where none are regressed
 
     def bev_at(self, places: Float[Tensor, "places 3"]) -> Float[Tensor, "places bev_channels"]:
         """F_bev interpolated between the middles of the four cells about each place; beyond the map its border's."""

@@ -5,6 +5,7 @@ import torch
 from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
+from most.geometry.boxes import along
 from most.membership.roi import Pairs
 from most.structures import Detections, Instances
 
@@ -14,11 +15,12 @@ def match_detections(
 ) -> Int64[Tensor, "detections"]:
     """Return the instance that each detection stands for, -1 for none.
 
-    One to one by confidence: the most confident detection takes the nearest modal centre of its class inside its RoI
-    (a box of half-sizes ``roi`` about the centre, m), the next the nearest of those left.
+    One to one by confidence: the most confident detection takes the nearest centre of its class inside its RoI
+    (a box of half-sizes ``roi`` about the centre, m, turned as the detection is), the next the nearest of those left.
     """
-    away = (detections.centres[:, None] - truth.centres[None]).abs()
-    allowed = (detections.classes[:, None] == truth.classes[None]) & (away < roi[:, None]).all(2)
+    away = detections.centres[:, None] - truth.centres[None]
+    turned = along(away, None if detections.yaws is None else detections.yaws[:, None])
+    allowed = (detections.classes[:, None] == truth.classes[None]) & (turned.abs() < roi[:, None]).all(2)
     cost = torch.where(allowed, away.norm(dim=2), torch.inf).cpu().numpy()
     matches = np.full(len(detections), -1)
     for detection in detections.scores.argsort(descending=True, stable=True).tolist():

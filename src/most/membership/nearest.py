@@ -6,12 +6,15 @@ from jaxtyping import Float
 from torch import Tensor
 
 from most.membership.evidence import Channels, Evidence
+from most.membership.rating import Rating
 from most.membership.roi import Pairs
 
 
 @dataclass
-class Nearest:
+class Nearest(Rating):
     """Membership by distance alone; it has nothing to set and nothing to train."""
+
+    needs = "centres"
 
     def build(self, channels: Channels) -> "Nearest":
         """It is its own network."""

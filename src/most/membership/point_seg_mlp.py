@@ -11,7 +11,9 @@ from jaxtyping import Float, Int64
 from torch import Tensor, nn
 
 from most.errors import ConfigError
+from most.geometry.boxes import along
 from most.membership.evidence import Channels, Evidence
+from most.membership.rating import Rating
 from most.membership.roi import Pairs
 from most.normed_linear import NormedLinear
 
@@ -27,6 +29,8 @@ class PointSegMLPSettings:
     bev: bool = True  # F_bev at the point and at the centre
     point: bool = True  # F_point
 
+    needs = "centres"
+
     def __post_init__(self) -> None:
         if not self.widths or min(self.widths) < 1:
             raise ConfigError(f"membership.widths: expected at least one positive width, found {self.widths}")
@@ -36,7 +40,7 @@ class PointSegMLPSettings:
         return PointSegMLP(self, channels)
 
 
-class PointSegMLP(nn.Module):
+class PointSegMLP(nn.Module, Rating):
     """Rates pairs of points and centres; training takes :meth:`logits` of what :meth:`describe` says of a batch."""
 
     def __init__(self, settings: PointSegMLPSettings, channels: Channels) -> None:
@@ -68,10 +72,11 @@ class PointSegMLP(nn.Module):
         return torch.cat(features, 1)
 
     def _geometry(self, evidence: Evidence, pairs: Pairs) -> Float[Tensor, "pairs 6"]:
-        """The point's position relative to the centre, in metres and in extents."""
-        detections = evidence.detections
-        away = evidence.points[pairs.points] - detections.centres[pairs.detections]
-        return torch.cat([away, away / detections.extents[pairs.detections].clamp(min=SMALLEST)], 1)
+        """The point's position relative to the centre, in metres, and in extents along the detection's axes."""
+        detections, rows = evidence.detections, pairs.detections
+        away = evidence.points[pairs.points] - detections.centres[rows]
+        turned = along(away, None if detections.yaws is None else detections.yaws[rows])
+        return torch.cat([away, turned / detections.extents[rows].clamp(min=SMALLEST)], 1)
 
     def _points(self, evidence: Evidence, points: Int64[Tensor, "used"]) -> Float[Tensor, "used features"]:
         features = [evidence.probabilities[points]]

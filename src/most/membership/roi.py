@@ -7,6 +7,7 @@ from jaxtyping import Float, Int64
 from torch import Tensor
 
 from most.errors import ConfigError
+from most.geometry.boxes import along
 from most.structures import Detections
 
 CHUNK = 2**24  # point-centre comparisons held in memory at once
@@ -14,7 +15,10 @@ CHUNK = 2**24  # point-centre comparisons held in memory at once
 
 @dataclass
 class RegionOfInterest:
-    """The box about a centre: the predicted extent times ``margin`` plus ``slack`` metres, or Algorithm 1's sphere."""
+    """The box about a centre: the predicted extent times ``margin`` plus ``slack`` metres, or Algorithm 1's sphere.
+
+    It is turned as the detection is.
+    """
 
     margin: float = 1.3
     slack: float = 0.3
@@ -27,7 +31,7 @@ class RegionOfInterest:
             raise ConfigError(f"inference.roi.slack: expected metres >= 0, found {self.slack}")
 
     def half_sizes(self, extents: Float[Tensor, "detections 3"]) -> Float[Tensor, "detections 3"]:
-        """Return each region's half-sizes, m; a sphere's are all its largest."""
+        """Return each region's half-sizes along its own axes, m; a sphere's are all its largest."""
         half = extents * self.margin + self.slack
         return half.amax(1, keepdim=True).expand(-1, 3) if self.sphere else half
 
@@ -45,7 +49,8 @@ class RegionOfInterest:
             of_class = (semantics == thing).nonzero().squeeze(1)
             centres = (detections.classes == thing).nonzero().squeeze(1)
             for some in of_class.split(max(1, CHUNK // max(1, len(centres)))):
-                away = points[some][:, None] - detections.centres[centres][None]
+                yaws = None if detections.yaws is None else detections.yaws[centres]
+                away = along(points[some][:, None] - detections.centres[centres][None], yaws)
                 reached = half[centres][None]
                 inside = away.norm(dim=2) < reached[..., 0] if self.sphere else (away.abs() < reached).all(2)
                 row, column = inside.nonzero().unbind(1)

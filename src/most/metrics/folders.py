@@ -11,7 +11,7 @@ from tqdm import tqdm
 
 from most.datasets.reader import Frame, Reader
 from most.datasets.taxonomy import Taxonomy
-from most.errors import DataError
+from most.errors import DataError, check_entries
 from most.metrics.assignments import assignments_path, read_assignments
 from most.metrics.instances import find_instances
 from most.metrics.membership import MembershipCounts, membership_counts
@@ -46,11 +46,7 @@ class _Scores:
     def add(self, frame: Frame, path: Path) -> None:
         """Score one scan's prediction."""
         truth, labels = self.reader.labels(frame), self.reader.read_prediction(path)
-        if len(labels) != len(truth):
-            raise DataError(
-                f"{path}: expected a label for each of the scan's {len(truth)} points, found {len(labels)}; "
-                "predict this scan again"
-            )
+        check_fit(self.reader, frame, path, labels, truth)
         known = self.taxonomy.to_training(truth, "truth of " + str(path))
         semantics = self.taxonomy.decode(labels, path)
         points, memberships = self._points(frame), None
@@ -87,6 +83,24 @@ def prediction_paths(reader: Reader, frames: Sequence[Frame], folder: Path) -> l
     return paths
 
 
+def check_fit(
+    reader: Reader, frame: Frame, path: Path, labels: Int64[Tensor, "labels"], truth: Int64[Tensor, "points"]
+) -> None:
+    """Refuse a prediction read from ``path`` that is no labelling of the truth's points.
+
+    Where the scan is there, which scoring does not need, it decides whether the truth's own file is at fault.
+    """
+    if len(labels) == len(truth):
+        return
+    try:
+        points = reader.num_points(frame)
+    except DataError:
+        points = len(truth)
+    if points != len(truth):
+        reader.sweep(frame)  # a DataError about the file of the truth
+    check_entries(path, len(labels), len(truth), whose="truth")
+
+
 def _has_assignments(reader: Reader, frames: Sequence[Frame], paths: Sequence[Path]) -> bool:
     """Whether everything is there that the membership accuracy needs; says so where only a part is."""
     there = sum(assignments_path(path).is_file() for path in paths)
@@ -113,11 +127,7 @@ def _memberships(
 ) -> MembershipCounts:
     """Score the memberships of one scan, written to ``path``."""
     found = read_assignments(path)
-    if not len(found.assigned) == len(points) == len(truth):
-        raise DataError(
-            f"{path}: expected as many points as labels ({len(truth)}), found {len(found.assigned)} assigned, and "
-            f"{len(points)} in the scan"
-        )
+    check_entries(path, len(found.assigned), len(points), "an entry")
     instances = find_instances(points, truth, truth_semantics, taxonomy)
     return membership_counts(
         points, semantics, truth_semantics, truth, found.detections, found.roi, found.assigned, instances

@@ -17,13 +17,13 @@ def find_instances(
     """The instances of one scan with their modal centres, which is all that matching takes: no extents, no motion."""
     own = taxonomy.is_thing(semantics) & (taxonomy.instance_of(labels) != 0) & points.isfinite().all(1)
     keys, owner, counts = torch.unique(labels[own], return_inverse=True, return_counts=True)
-    sums = torch.zeros(len(keys), 3, dtype=torch.float64).index_add_(0, owner, points[own].double())
+    sums = points.new_zeros(len(keys), 3, dtype=torch.float64).index_add_(0, owner, points[own].double())
     return Instances(
         keys=keys,
         classes=torch.zeros_like(keys).index_copy_(0, owner, semantics[own]),
         counts=counts,
         centres=(sums / counts[:, None]).float(),
-        extents=torch.zeros(len(keys), 3),
-        velocities=torch.zeros(len(keys), 2),
-        velocity_known=torch.zeros(len(keys), dtype=torch.bool),
+        extents=points.new_zeros(len(keys), 3),
+        velocities=points.new_zeros(len(keys), 2),
+        velocity_known=torch.zeros_like(keys, dtype=torch.bool),
     )

@@ -13,6 +13,7 @@ import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
+from most.geometry.boxes import along
 from most.membership.matching import match_detections
 from most.metrics.means import ratio
 from most.structures import Detections, Instances
@@ -52,6 +53,7 @@ def membership_counts(
 ) -> MembershipCounts:
     """Score one sweep's memberships; points, detections and ``truth`` share a frame (m).
 
+    ``roi`` are half-sizes of the regions, which are turned as their detections are.
     ``semantics`` is predicted; ``assigned`` is the index of the detection that a point was given to after overlaps
     were resolved, -1 for none. ``truth`` holds all instances of the sweep, and its keys are ``truth_labels``: a point
     of a detection's class without an instance could be of any, so it is left out like void.
@@ -63,8 +65,9 @@ def membership_counts(
         anyones = (truth_semantics == thing) & ~torch.isin(truth_labels, truth.keys)
         candidates = ((semantics == thing) & (truth_semantics != 0) & ~anyones).nonzero().squeeze(1)
         centres, keys = detections.centres[owners], truth.keys[matches[owners]]
+        yaws = None if detections.yaws is None else detections.yaws[owners]
         for some in candidates.split(max(1, CHUNK // len(owners))):
-            inside = ((points[some][:, None] - centres).abs() < roi[owners]).all(2)
+            inside = (along(points[some][:, None] - centres, yaws).abs() < roi[owners]).all(2)
             right = inside & ((assigned[some][:, None] == owners) == (truth_labels[some][:, None] == keys))
             contested = inside.sum(1) > 1
             numbers = (right, inside, right[contested], inside[contested])

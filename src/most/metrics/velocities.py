@@ -31,7 +31,8 @@ def is_moving(truth: Instances) -> Bool[Tensor, "instances"]:
 
 
 def velocity_errors(detections: Detections, roi: Float[Tensor, "detections 3"], truth: Instances) -> VelocityErrors:
-    """Compare the velocities of one scan's detections with those of moving objects; others do not count.
+    """Compare the velocities of one scan's detections with those of moving objects; others do not count,
+    nor do detections without one.
 
     ``roi`` are half-sizes (m) as in :func:`most.membership.matching.match_detections`, which says who stands for whom.
     """
@@ -39,4 +40,5 @@ def velocity_errors(detections: Detections, roi: Float[Tensor, "detections 3"], 
     stands = matches >= 0
     found, objects = detections.select(stands), truth.select(matches[stands])
     errors = (found.velocities - objects.velocities).norm(dim=1)
-    return VelocityErrors(objects.classes, errors, objects.velocities.norm(dim=1)).select(is_moving(objects))
+    counted = is_moving(objects) & errors.isfinite()
+    return VelocityErrors(objects.classes, errors, objects.velocities.norm(dim=1)).select(counted)

@@ -17,7 +17,7 @@ from most.datasets.taxonomy import Taxonomy
 from most.errors import DataError
 from most.geometry.similarity import Similarity
 from most.metrics.assignments import assignments_path, read_assignments
-from most.metrics.folders import prediction_paths
+from most.metrics.folders import check_fit, prediction_paths
 from most.metrics.links import Links
 from most.metrics.overlaps import find_overlaps
 from most.metrics.paired import paired_difference
@@ -98,8 +98,9 @@ def _count(reader: Reader, frame: Frame, truth: Instances, folders: dict[str, Pa
     paths = {name: reader.prediction_path(folder, frame) for name, folder in folders.items()}
     labels = {name: reader.read_prediction(path) for name, path in paths.items()}
     raw, moves = reader.labels(frame), is_moving(truth)
-    sizes = {len(each) for each in (raw, *labels.values())}
-    if len(sizes) > 1 or not _same_segments(*labels.values()):
+    for name, path in paths.items():
+        check_fit(reader, frame, path, labels[name], raw)
+    if not _same_segments(*labels.values()):
         raise DataError(
             f"{paths['nearest']}: expected the segments of {paths['velocity']}, found others; "
             "track the same predictions in both ways"

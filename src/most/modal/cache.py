@@ -1,13 +1,13 @@
-"""Keeping instance tables on disk, one file a sequence, rebuilt when what they were made from changes."""
+"""Keeping instance tables and their boxes on disk, a file a sequence, rebuilt when what they were made from changes."""
 
 import hashlib
 import json
 import zipfile
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
@@ -15,11 +15,13 @@ from tqdm import tqdm
 
 from most.errors import DataError
 from most.files import atomic_write
+from most.modal.boxes import InstanceBoxes, SequenceBoxes, boxes_of_rows
 from most.modal.build import LabelRules, build_table
 from most.modal.instances import InstanceTable
 from most.modal.outline import Outlines
 from most.structures import Sweep
 
+Kept = TypeVar("Kept", InstanceTable, InstanceBoxes)
 FORMAT = 1  # of the file and of the numbers in it: count up when either changes
 _UNREADABLE = (  # all that numpy and zipfile stumble with over foreign bytes
     OSError, EOFError, ValueError, KeyError, TypeError, RuntimeError, zipfile.BadZipFile, zlib.error,
@@ -47,7 +49,7 @@ def cached_table(
     else altogether is replaced. Raises DataError where ``path`` cannot be written.
     """
     made_from = f"{made_from} max_gap={rules.max_gap}"
-    table = load(path, made_from)
+    table = load(InstanceTable, path, made_from)
     if table is None:
         progress = tqdm(sweeps, f"instances of {path.stem}", num_sweeps, unit="sweep", leave=False)
         table = build_table(iter(progress), rules)
@@ -55,8 +57,17 @@ def cached_table(
     return table
 
 
-def save(table: InstanceTable, path: Path, made_from: str) -> None:
-    """Write a table; DataError where that is impossible."""
+def cached_boxes(path: Path, made_from: str, table: InstanceTable, boxes: Callable[[], SequenceBoxes]) -> InstanceBoxes:
+    """Return the boxes of a table's rows at ``path``, or find them among the sequence's and keep them there."""
+    found = load(InstanceBoxes, path, made_from)
+    if found is None:
+        found = boxes_of_rows(table, boxes())
+        save(found, path, made_from)
+    return found
+
+
+def save(table: InstanceTable | InstanceBoxes, path: Path, made_from: str) -> None:
+    """Write a table, or its boxes; DataError where that is impossible."""
     try:
         with atomic_write(path) as file:
             np.savez(file, made_from=np.array(made_from), **_flatten(table))
@@ -64,19 +75,21 @@ def save(table: InstanceTable, path: Path, made_from: str) -> None:
         raise DataError(f"{path}: expected a place to keep the instance table, found {error}") from error
 
 
-def load(path: Path, made_from: str) -> InstanceTable | None:
-    """Read a table; None if there is no file, or one that is damaged or was made from something else."""
+def load(kind: type[Kept], path: Path, made_from: str) -> Kept | None:
+    """Read what ``save`` wrote of that kind; None if there is no file, or a damaged one, or one of something else."""
     try:
         with np.load(path, allow_pickle=False) as arrays:
             if str(arrays["made_from"]) != made_from:
                 return None
-            return _unflatten({name: torch.from_numpy(arrays[name]) for name in arrays.files if name != "made_from"})
+            return _unflatten(
+                kind, {name: torch.from_numpy(arrays[name]) for name in arrays.files if name != "made_from"}
+            )
     except _UNREADABLE:
         return None
 
 
-def _flatten(table: InstanceTable) -> dict[str, Any]:
-    """Return the table's tensors by name; those of its outlines as ``outlines.starts`` and so on."""
+def _flatten(table: InstanceTable | InstanceBoxes) -> dict[str, Any]:
+    """Return the tensors by name; those of a table's outlines as ``outlines.starts`` and so on."""
     arrays: dict[str, Any] = {}
     for field in fields(table):
         value = getattr(table, field.name)
@@ -87,11 +100,11 @@ def _flatten(table: InstanceTable) -> dict[str, Any]:
     return arrays
 
 
-def _unflatten(arrays: dict[str, torch.Tensor]) -> InstanceTable:
+def _unflatten(kind: type[Kept], arrays: dict[str, torch.Tensor]) -> Kept:
     parts: dict[str, Any] = {}
-    for field in fields(InstanceTable):
+    for field in fields(kind):
         if field.type is Outlines:
             parts[field.name] = Outlines(*(arrays[f"{field.name}.{part.name}"] for part in fields(Outlines)))
         else:
             parts[field.name] = arrays[field.name]
-    return InstanceTable(**parts)
+    return kind(**parts)

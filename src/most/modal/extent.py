@@ -1,12 +1,13 @@
-"""How large an instance is: strategies over its outlines (paper, section III, "Estimating modal extent")."""
+"""How large an instance is: strategies over its outlines (paper, section III, "Estimating modal extent"; Table I)."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-from jaxtyping import Float64, Int64
+from jaxtyping import Int64
 from torch import Tensor
 
 from most.errors import ConfigError
-from most.modal.instances import InstanceTable
+from most.modal.instances import Axes, InstanceTable, Shapes
 
 
 @dataclass
@@ -16,13 +17,31 @@ class ShrinkWrap:
     floor: float = 0.05  # m; an instance of one point has no size, and extents are regressed as logarithms
 
     def __post_init__(self) -> None:
-        _check_floor(self.floor)
+        check_floor(self.floor)
 
-    def half_sizes(
-        self, table: InstanceTable, rows: Int64[Tensor, "rows"], planar: Float64[Tensor, "2 2"], vertical: float
-    ) -> Float64[Tensor, "rows 3"]:
-        """Return the half-sizes of the rows' own outlines, at least ``floor``, m."""
-        return table.outlines.half_sizes(rows, planar, vertical).clamp(min=self.floor)
+    def build(self, training: Iterable[InstanceTable]) -> "ShrinkWrap":
+        """It is its own strategy."""
+        return self
+
+    def shapes(self, table: InstanceTable, rows: Int64[Tensor, "rows"], axes: Axes) -> Shapes:
+        """Return the rows' own outlines, half-sizes of at least ``floor``."""
+        half_sizes = table.outlines.half_sizes(rows, axes.planar, axes.vertical)
+        return Shapes(table.centres[rows], half_sizes.clamp(min=self.floor))
+
+
+@dataclass
+class DropSmall(ShrinkWrap):
+    """DSB: shrink-wrapped, and what has too few points is no target of the heat maps.
+
+    It stays an instance of the truth for memberships, figures and pictures.
+    """
+
+    min_points: int = 3  # in the current sweep
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.min_points < 1:
+            raise ConfigError(f"extent.min_points: expected a number of at least 1, found {self.min_points}")
 
 
 @dataclass
@@ -32,15 +51,19 @@ class TrackMax:
     floor: float = 0.05  # m
 
     def __post_init__(self) -> None:
-        _check_floor(self.floor)
+        check_floor(self.floor)
 
-    def half_sizes(
-        self, table: InstanceTable, rows: Int64[Tensor, "rows"], planar: Float64[Tensor, "2 2"], vertical: float
-    ) -> Float64[Tensor, "rows 3"]:
-        """Return the half-sizes of the rows' tracks, at least ``floor``, m."""
-        return table.track_outlines.half_sizes(table.tracks[rows], planar, vertical).clamp(min=self.floor)
+    def build(self, training: Iterable[InstanceTable]) -> "TrackMax":
+        """It is its own strategy."""
+        return self
+
+    def shapes(self, table: InstanceTable, rows: Int64[Tensor, "rows"], axes: Axes) -> Shapes:
+        """Return the outlines of the rows' tracks, half-sizes of at least ``floor``."""
+        half_sizes = table.track_outlines.half_sizes(table.tracks[rows], axes.planar, axes.vertical)
+        return Shapes(table.centres[rows], half_sizes.clamp(min=self.floor))
 
 
-def _check_floor(floor: float) -> None:
+def check_floor(floor: float) -> None:
+    """Raise a ConfigError unless half-sizes have a logarithm."""
     if not floor > 0:
         raise ConfigError(f"extent.floor: expected a length above 0 m, found {floor}")

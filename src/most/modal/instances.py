@@ -1,5 +1,6 @@
 """The thing instances of a sequence: one row per instance and frame, and what a window's sample takes from them."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -13,18 +14,48 @@ from most.modal.outline import Outlines
 from most.structures import Instances
 
 
+@dataclass(frozen=True)
+class Axes:
+    """Along what a window looks at the instances of one sweep; its linear map leaves z upright."""
+
+    linear: Float64[Tensor, "3 3"]  # window from sensor frame
+    heading: Float64[Tensor, ""]  # yaw of the sensor's pose
+
+    @property
+    def planar(self) -> Float64[Tensor, "2 2"]:
+        """The window's ground plane from world heading's."""
+        return self.linear[:2, :2] @ turn(-self.heading)
+
+    @property
+    def vertical(self) -> float:
+        """How z is scaled."""
+        return float(self.linear[2, 2])
+
+
+@dataclass
+class Shapes:
+    """Where instances are, how large, and how turned, one a row."""
+
+    centres: Float64[Tensor, "rows 3"]  # sensor frame, m
+    half_sizes: Float64[Tensor, "rows 3"]  # m, positive, in the window: along its axes, or along, across and up
+    yaws: Float64[Tensor, "rows"] | None = None  # from the window's x to along, radians; None: along its axes
+
+
 @runtime_checkable
 class ExtentStrategy(Protocol):
     """Says how large an instance is."""
 
-    def half_sizes(
-        self,
-        table: "InstanceTable",
-        rows: Int64[Tensor, "rows"],
-        planar: Float64[Tensor, "2 2"],
-        vertical: float,
-    ) -> Float64[Tensor, "rows 3"]:
-        """Return half-sizes (m, positive) along the axes that ``planar`` maps world heading to; z by ``vertical``."""
+    def shapes(self, table: "InstanceTable", rows: Int64[Tensor, "rows"], axes: Axes) -> Shapes:
+        """Return the shapes of one sweep's rows; centres are the modal ones unless a strategy knows better."""
+        ...
+
+
+@runtime_checkable
+class Extent(Protocol):
+    """What becomes a strategy, once it has asked the training split's instances what it wants to know of them."""
+
+    def build(self, training: Iterable["InstanceTable"]) -> ExtentStrategy:
+        """Make the strategy; ``training`` is only gone through where needed."""
         ...
 
 
@@ -54,6 +85,10 @@ class InstanceTable:
     def __len__(self) -> int:
         return len(self.keys)
 
+    def rows(self, frame: int) -> Int64[Tensor, "rows"]:
+        """Return the rows of the table's ``frame``-th frame."""
+        return torch.arange(int(self.starts[frame]), int(self.starts[frame + 1]))
+
     def instances(
         self,
         index: int,
@@ -70,18 +105,18 @@ class InstanceTable:
         frame = int(torch.searchsorted(self.frames, index))
         if frame == len(self.frames) or self.frames[frame] != index:
             raise DataError(f"instance table: expected a labelled sweep {index}, found none among {len(self.frames)}")
-        rows = torch.arange(int(self.starts[frame]), int(self.starts[frame + 1]))
-        rotation = self.poses[frame, :3, :3]
-        planar = linear[:2, :2] @ turn(-yaw(self.poses[frame]))
+        rows, rotation = self.rows(frame), self.poses[frame, :3, :3]
+        shapes = strategy.shapes(self, rows, Axes(linear, yaw(self.poses[frame])))
         velocities = self.world_velocities[rows] @ rotation @ linear.T
         return Instances(
             keys=self.keys[rows],
             classes=self.classes[rows],
             counts=self.counts[rows],
-            centres=(self.centres[rows] @ linear.T + translation).float(),
-            extents=strategy.half_sizes(self, rows, planar, float(linear[2, 2])).float(),
+            centres=(shapes.centres @ linear.T + translation).float(),
+            extents=shapes.half_sizes.float(),
             velocities=velocities[:, :2].float(),
             velocity_known=self.velocity_known[rows],
+            yaws=None if shapes.yaws is None else shapes.yaws.float(),
         )
 
 

@@ -6,6 +6,7 @@ import torch
 from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
+from most.geometry.boxes import bounds
 from most.modal.heatmap import HeatmapTargets, draw_heatmap
 from most.structures import Instances, OnDevice
 
@@ -24,6 +25,7 @@ class BevTargets(OnDevice):
     extent: Float[Tensor, "centres 3"]  # log of the half-sizes in m
     velocity: Float[Tensor, "centres 2"]  # m/s, where known
     velocity_known: Bool[Tensor, "centres"]
+    yaw: Float[Tensor, "centres 2"] | None = None  # sine and cosine of twice the yaw; None where boxes have none
 
 
 def bev_targets(
@@ -50,7 +52,7 @@ def bev_targets(
     merged, batch, position, middle = merged.select(keep), batch[keep], position[keep], middle[keep]
     cells = torch.cat([batch[:, None], middle.long()], 1)
     planes = batch * len(thing_ids) + hits[keep].long().argmax(1)
-    variances = settings.variances(merged.extents[:, :2] / size)
+    variances = settings.variances(bounds(merged.extents, merged.yaws)[:, :2] / size)
     heatmap = draw_heatmap(planes, cells[:, 1:], variances, (len(instances) * len(thing_ids), *shape))
     chosen = _largest_per_cell((cells[:, 0] * shape[0] + cells[:, 1]) * shape[1] + cells[:, 2], merged.counts)
     merged = merged.select(chosen)
@@ -62,6 +64,7 @@ def bev_targets(
         extent=merged.extents.log(),
         velocity=merged.velocities,
         velocity_known=merged.velocity_known,
+        yaw=None if merged.yaws is None else torch.stack([(2 * merged.yaws).sin(), (2 * merged.yaws).cos()], 1),
     )
 
 

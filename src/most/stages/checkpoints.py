@@ -83,6 +83,10 @@ class LastCheckpoint(Callback):
         if _highest(trainer, STOP if self.asked else GO_ON) == STOP:
             self._stop(trainer)
 
+    def on_exception(self, trainer: L.Trainer, pl_module: L.LightningModule, exception: BaseException) -> None:
+        """Leave signals as they were: other jobs of a sweep run in this process."""
+        self.teardown(trainer, pl_module, "fit")
+
     def teardown(self, trainer: L.Trainer, pl_module: L.LightningModule, stage: str) -> None:
         """Leave signals as they were."""
         for number, handler in self.former.items():

@@ -5,21 +5,30 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import torch
-from jaxtyping import Float, Int64
+from jaxtyping import Bool, Float, Int64
 from lightning.pytorch.utilities.types import OptimizerLRSchedulerConfig
 from torch import Tensor
 
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError
 from most.inference import Predictor
-from most.losses import LossWeights, class_weights, focal_loss, lovasz_loss, regression_losses, semantic_loss
+from most.losses import (
+    LossWeights,
+    class_weights,
+    focal_loss,
+    lovasz_loss,
+    offset_loss,
+    regression_losses,
+    semantic_loss,
+)
 from most.modal.heatmap import HeatmapTargets
+from most.modal.offsets import centre_offsets
 from most.modal.targets import bev_targets
 from most.modal.voxel_labels import majority
-from most.network import Network, NetworkOutput
+from most.network import NetworkOutput
 from most.stages.scores import Scores
 from most.stages.stage import Stage
-from most.structures import Sample
+from most.structures import BevMaps, Sample
 
 
 @dataclass
@@ -79,25 +88,42 @@ class DetectionStage(Stage):
     def losses(self, samples: list[Sample], output: NetworkOutput) -> dict[str, Float[Tensor, ""]]:
         """Return each loss, unweighted (Eq. 1, 2, 4)."""
         semantics = torch.cat([sample.semantics for sample in samples if sample.semantics is not None])
-        seen = torch.cat([_is_in_range(sample, self.network) for sample in samples])
-        semantics = semantics[seen]
+        semantics = semantics[self._in_range(samples)]
         voxels = output.voxels
         voxel_semantics = majority(
             voxels.point_voxel[output.current], semantics, len(voxels), self.taxonomy.num_classes
         )
-        bev = self.network.bev_grid
-        targets = bev_targets(
-            [sample.instances for sample in samples if sample.instances is not None],
-            bev.lower, bev.cell, bev.shape, self.taxonomy.things, self.training_settings.targets,
-        )  # fmt: skip
         lovasz = self.training_settings.losses.lovasz > 0  # it sorts: not for nothing
         return {
             "voxel": semantic_loss(output.voxel_logits, voxel_semantics, self.class_weights),
             **({"lovasz": lovasz_loss(output.voxel_logits, voxel_semantics)} if lovasz else {}),
             "point": semantic_loss(output.point_logits, semantics, self.class_weights),
-            "heatmap": focal_loss(output.maps.heatmap, targets.heatmap),
-            **regression_losses(output.maps, targets),
+            **(self._offset_losses(samples, output) if output.maps is None else self._map_losses(samples, output.maps)),
         }
+
+    def _map_losses(self, samples: list[Sample], maps: BevMaps) -> dict[str, Float[Tensor, ""]]:
+        bev = self.network.bev_grid
+        targets = bev_targets(
+            [sample.instances for sample in samples if sample.instances is not None],
+            bev.lower, bev.cell, bev.shape, self.taxonomy.things, self.training_settings.targets,
+        )  # fmt: skip
+        return {"heatmap": focal_loss(maps.heatmap, targets.heatmap), **regression_losses(maps, targets)}
+
+    def _offset_losses(self, samples: list[Sample], output: NetworkOutput) -> dict[str, Float[Tensor, ""]]:
+        """Points of things with an instance learn their offsets, as the modal targets have them."""
+        targets = [
+            centre_offsets(sample.points[: sample.num_current, :3], sample.labels, sample.instances)
+            for sample in samples
+            if sample.labels is not None and sample.instances is not None
+        ]
+        offsets, known = (torch.cat(each)[self._in_range(samples)] for each in zip(*targets, strict=True))
+        assert output.offsets is not None  # either maps or offsets
+        return {"offset": offset_loss(output.offsets, offsets, known)}
+
+    def _in_range(self, samples: list[Sample]) -> Bool[Tensor, "points"]:
+        """Whether the network sees each of the current sweeps' points."""
+        grid = self.network.grid
+        return torch.cat([grid.in_range(sample.points[: sample.num_current]) for sample in samples])
 
     def training_step(self, samples: list[Sample], _: int) -> Float[Tensor, ""]:
         """One batch: every loss is logged apart, and their weighted sum is returned (Eq. 5)."""
@@ -139,7 +165,3 @@ def one_cycle(
         optimizer, settings.max_lr, steps, pct_start=warm_up, div_factor=settings.initial_divisor
     )
     return optimizer, schedule
-
-
-def _is_in_range(sample: Sample, network: Network) -> Tensor:
-    return network.grid.in_range(sample.points[: sample.num_current])

@@ -42,9 +42,9 @@ class Numbers:
                 self._free.setdefault(kind, deque()).append(number)
 
     def state(self) -> State:
-        """Return what was given and what is free, in plain tensors."""
-        given = list(self._given.items())
-        free = [(kind, number) for kind, numbers in self._free.items() for number in numbers]
+        """Return what was given and what is free, in plain tensors; by class, whichever had a number first."""
+        given = sorted(self._given.items())
+        free = [(kind, number) for kind, numbers in sorted(self._free.items()) for number in numbers]
         return _table(given), _table(free)
 
     def restore(self, state: State) -> None:

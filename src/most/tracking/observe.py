@@ -6,10 +6,11 @@ import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
+from most.geometry.boxes import bounds
+from most.geometry.segments import measure
 from most.structures import Detections, Observations, OnDevice, Panoptic
 
 UNDETECTED = 0.0  # score of a segment that no detection claims: any detection chooses its track before it
-SMALLEST = 0.05  # half-size of a segment of one point, m
 
 
 @dataclass
@@ -59,20 +60,18 @@ def _segments(panoptic: Panoptic, things: list[int]) -> tuple[Int64[Tensor, "seg
 def _by_points(
     points: Float[Tensor, "points 3"], classes: Int64[Tensor, "segments"], rows: Int64[Tensor, "points"]
 ) -> Observations:
-    """Observe segments by their finite points; one that has none is put at the sensor."""
+    """Observe segments by their finite points; one that has none is nowhere."""
     own = (rows >= 0) & points.isfinite().all(1)
-    row, near, count = rows[own], points[own].double(), len(classes)
-    sizes = torch.bincount(row, minlength=count).clamp(min=1)
-    centres = near.new_zeros(count, 3).index_add_(0, row, near) / sizes[:, None]
-    reach = torch.full_like(centres, SMALLEST)
-    reach.scatter_reduce_(0, row[:, None].expand(-1, 3), (near - centres[row]).abs(), "amax")
+    count = len(classes)
+    centres, extents = measure(points[own], rows[own], count)
     return Observations(
         classes=classes,
-        centres=centres.float(),
-        extents=reach.float(),
+        centres=centres,
+        extents=extents,
         velocities=points.new_zeros(count, 2, dtype=torch.float32),
         velocity_known=torch.zeros_like(classes, dtype=torch.bool),
         scores=points.new_full((count,), UNDETECTED, dtype=torch.float32),
+        placed=torch.bincount(rows[own], minlength=count) > 0,
     )
 
 
@@ -85,7 +84,10 @@ def _by_detections(
     most, best = votes.reshape(len(seen), len(detections)).max(1)
     found = ((most > 0) & (detections.classes[best] == seen.classes)).nonzero().squeeze(1)
     lent = detections.select(best[found])
+    lent.extents = bounds(lent.extents, lent.yaws)
     for name in ("centres", "extents", "velocities", "scores"):
         setattr(seen, name, getattr(seen, name).index_copy(0, found, getattr(lent, name).float()))
-    seen.velocity_known = seen.velocity_known.index_fill(0, found, value=True)
+    seen.placed = seen.placed.index_fill(0, found, value=True)
+    seen.velocity_known = seen.velocity_known.index_copy(0, found, lent.velocities.isfinite().all(1))
+    seen.velocities = seen.velocities.nan_to_num(0.0)
     return seen

@@ -42,20 +42,22 @@ class Tracker:
 
         ``pose`` is world_from_sensor, ``time`` in seconds on any clock. Sweeps may be missing. Without a pose the
         last one holds: the sensor frame is the world where there never was one, and a stream that loses its poses is
-        taken to stand still. A sweep that comes late, or what is not finite, is a DataError that changes nothing:
+        taken to stand still. An observation that is nowhere has a number for this sweep alone, and no track. A sweep
+        that comes late, or what is not finite, is a DataError that changes nothing:
         the sweep may be left out, and the next one goes on.
         """
         self.check(pose, time)
-        if not bool(seen.centres.isfinite().all() & seen.velocities[seen.velocity_known].isfinite().all()):
+        if not bool(seen.centres[seen.placed].isfinite().all() & seen.velocities[seen.velocity_known].isfinite().all()):
             raise DataError(f"sweep at {time} s: expected finite centres and velocities, found others; leave them out")
         self._pose, self._time = self._pose if pose is None else pose.cpu().clone(), time
         self._forget()
         if not len(seen):
             return torch.empty_like(seen.classes)
         local = seen.to("cpu")
-        order = canonical_order(local)
-        numbers = torch.empty_like(local.classes)
-        numbers[order] = self._follow(Sightings.of(local.select(order), self._pose))
+        order, numbers = canonical_order(local), torch.empty_like(local.classes)
+        placed, nowhere = order[local.placed[order]], order[~local.placed[order]]
+        numbers[placed] = self._follow(Sightings.of(local.select(placed), self._pose))
+        numbers[nowhere] = self._number_once(local.classes[nowhere])
         return numbers.to(seen.classes.device)
 
     def tracks(self) -> Tracks:
@@ -102,6 +104,12 @@ class Tracker:
         numbers = torch.empty_like(track)
         numbers[again] = self._live.numbers[track[again]]
         numbers[new] = self._begin(seen.select(new))
+        return numbers
+
+    def _number_once(self, classes: Int64[Tensor, "observations"]) -> Int64[Tensor, "observations"]:
+        """Return numbers that nothing else in this sweep has, and take them back at once."""
+        numbers = torch.tensor([self._numbers.take(thing) for thing in classes.tolist()], dtype=torch.int64)
+        self._numbers.release(zip(classes.tolist(), numbers.tolist(), strict=True), _named(self._live))
         return numbers
 
     def _associate(self, seen: Sightings) -> Int64[Tensor, "observations"]:

@@ -49,20 +49,13 @@ def draw_bev(
     labels = [prediction.semantics] if truth is None else [prediction.semantics, truth.semantics]
     seen = [one for one in torch.unique(torch.cat(labels)).tolist() if one]
     figure, axes = make_panels(3 if truth else 1, title, figures or {}, class_legend(seen, style), reach)
-    taken: dict[int, int] = {}  # the colours of predicted instances that the truth has too
-    if truth:
-        agreement = compare(truth, prediction, things)
-        places = _draw_labels(axes[0], xyz, truth, taken, style, reach)
-        taken = {mine: places[yours] for mine, yours in agreement.partners.items()}
-        _draw_errors(axes[2], xyz, agreement, reach)
-        name_panel(axes[0], "truth", f"instances: {len(places)}")
     middle = axes[len(axes) // 2]
+    taken: dict[int, int] = {}
+    if truth:
+        taken = _draw_truth(axes[0], axes[2], xyz, truth, prediction, instances, style, reach)
     _draw_labels(middle, xyz, prediction, taken, style, reach)
     _draw_objects(middle, detections, detections.velocities.norm(dim=1) > SLOW, style)
     name_panel(middle, "prediction", f"detections: {len(detections)}")
-    if truth and instances:
-        moving = instances.velocity_known & (instances.velocities.norm(dim=1) > SLOW)
-        _draw_objects(axes[0], instances, moving, style)
     return figure
 
 
@@ -70,6 +63,27 @@ def save(figure: Figure, path: Path) -> None:
     """Write a figure as PNG; a reader never sees half of it."""
     with atomic_write(path) as file:
         figure.savefig(file, format="png", dpi=DPI, facecolor=GROUND, pil_kwargs={"compress_level": 3})
+
+
+def _draw_truth(
+    left: Axes,
+    right: Axes,
+    xyz: Float[np.ndarray, "points 3"],
+    truth: Panoptic,
+    prediction: Panoptic,
+    instances: Instances | None,
+    style: ClassStyle,
+    reach: float,
+) -> dict[int, int]:
+    """Draw the truth and the errors; return the places of the colours of predicted instances that the truth has too."""
+    agreement = compare(truth, prediction, style.things)
+    places = _draw_labels(left, xyz, truth, {}, style, reach)
+    name_panel(left, "truth", f"instances: {len(places)}")
+    _draw_errors(right, xyz, agreement, reach)
+    if instances:
+        moving = instances.velocity_known & (instances.velocities.norm(dim=1) > SLOW)
+        _draw_objects(left, instances, moving, style)
+    return {mine: places[yours] for mine, yours in agreement.partners.items()}
 
 
 def _draw_labels(
@@ -127,9 +141,10 @@ def _draw_objects(
     objects, moving = objects.to("cpu"), moving.cpu()
     colours = [style.colour(one) for one in objects.classes.tolist()]
     centres, half_sizes = objects.centres[:, :2].numpy(), objects.extents[:, :2].numpy()
-    boxes = [
-        Rectangle((y - b, x - a), 2 * b, 2 * a)
-        for (x, y), (a, b) in zip(centres.tolist(), half_sizes.tolist(), strict=True)
+    yaws = [0.0] * len(centres) if objects.yaws is None else objects.yaws.rad2deg().tolist()
+    boxes = [  # drawn over (y, x), where a turn from x to y is clockwise
+        Rectangle((y - b, x - a), 2 * b, 2 * a, angle=-yaw, rotation_point="center")
+        for (x, y), (a, b), yaw in zip(centres.tolist(), half_sizes.tolist(), yaws, strict=True)
     ]
     axes.add_collection(PatchCollection(boxes, facecolor="none", edgecolor=colours, linewidth=0.9, zorder=3))
     for one in objects.classes.unique().tolist():

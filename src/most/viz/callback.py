@@ -33,7 +33,7 @@ class BevPictures(Callback):
     ) -> None:
         """Draw the batch's first sweep when its turn has come."""
         batches = int(sum(trainer.num_val_batches))
-        due = {round((turn + 0.5) * batches / self.number - 0.5) for turn in range(self.number)}
+        due = sorted({round((turn + 0.5) * batches / self.number - 0.5) for turn in range(self.number)})
         if batch_idx not in due or not trainer.is_global_zero:
             return
         sample, prediction = batch[0].to("cpu"), outputs["predictions"][0].to("cpu")
@@ -41,7 +41,8 @@ class BevPictures(Callback):
         name = f"{sample.sequence}_{sample.index:06d}"
         save(figure, self.folder / f"epoch_{trainer.current_epoch:03d}" / f"{name}.png")
         if isinstance(trainer.logger, WandbLogger):
-            trainer.logger.log_image(f"{self.prefix}val/bev_{name}", [figure])
+            key = f"{self.prefix}val/bev_{due.index(batch_idx) + 1}"
+            trainer.logger.log_image(key, [figure], trainer.global_step, caption=[name])
 
 
 def draw_prediction(sample: Sample, prediction: Prediction, taxonomy: Taxonomy) -> Figure:

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
 from most.datasets.reader import Reader
-from most.errors import DataError
+from most.errors import check_entries
 from most.metrics.assignments import Assignments, assignments_path, read_assignments
 from most.modal.build import LabelRules, build_table
 from most.modal.extent import ShrinkWrap
@@ -20,7 +20,7 @@ from most.viz.bev import SLOW
 
 @dataclass
 class Objects:
-    """Boxes along the axes of one scan's sensor frame."""
+    """Boxes in one scan's sensor frame."""
 
     segments: Int64[Tensor, "objects"]  # identity, as ``agreement.segments`` names it; 0 for none
     classes: Int64[Tensor, "objects"]
@@ -28,6 +28,7 @@ class Objects:
     half_sizes: Float[Tensor, "objects 3"]  # m
     velocities: Float[Tensor, "objects 2"]  # over the ground, m/s
     moving: Bool[Tensor, "objects"]  # known to be faster than modal centres of standing things seem to be
+    yaws: Float[Tensor, "objects"] | None = None  # from x to where half-sizes lie along; None: along the axes
 
     def __len__(self) -> int:
         return len(self.classes)
@@ -40,11 +41,7 @@ def predicted_objects(
     beside = assignments_path(path)
     if beside.is_file():
         found = read_assignments(beside)
-        if len(found.assigned) != len(labels):
-            raise DataError(
-                f"{beside}: expected as many points as labels, {len(labels)}, found {len(found.assigned)}; "
-                "predict this scan again"
-            )
+        check_entries(beside, len(found.assigned), len(labels), "an entry")
         return _of_detections(found.detections, claimed_segments(found, segments))
     rules = _rules(reader, lambda raw: reader.taxonomy.decode(raw, path))
     table = build_table([replace(sweep, labels=labels)], rules)
@@ -80,7 +77,7 @@ def _objects(
     found: Detections | Instances, segments: Int64[Tensor, "objects"], known: Bool[Tensor, "objects"]
 ) -> Objects:
     moving = known & (found.velocities.norm(dim=1) > SLOW)
-    return Objects(segments, found.classes, found.centres, found.extents, found.velocities, moving)
+    return Objects(segments, found.classes, found.centres, found.extents, found.velocities, moving, found.yaws)
 
 
 def _rules(reader: Reader, to_training: Callable[[Tensor], Tensor]) -> LabelRules:

@@ -73,7 +73,12 @@ class Recording:
         colours, centres = identities.colours(objects.segments), objects.centres.numpy()
         names = [self._name(*pair) for pair in zip(objects.classes.tolist(), objects.segments.tolist(), strict=True)]
         boxes = rr.Boxes3D(
-            centers=centres, half_sizes=objects.half_sizes.numpy(), colors=colours, labels=names, show_labels=False
+            centers=centres,
+            half_sizes=objects.half_sizes.numpy(),
+            quaternions=None if objects.yaws is None else quaternions(objects.yaws),
+            colors=colours,
+            labels=names,
+            show_labels=False,
         )
         self._stream.log(f"{tree}/sensor/boxes", boxes)
         moving = objects.moving.numpy()
@@ -97,6 +102,12 @@ class Recording:
 
     def _name(self, class_id: int, segment: int) -> str:
         return f"{self.style.names[class_id]} {segment & 0xFFFFFFFF}" if segment else self.style.names[class_id]
+
+
+def quaternions(yaws: Float[Tensor, "objects"]) -> Float[np.ndarray, "objects 4"]:
+    """Return turns about z as x, y, z, w."""
+    zero, half = torch.zeros_like(yaws), yaws / 2
+    return torch.stack([zero, zero, half.sin(), half.cos()], 1).numpy()
 
 
 def annotations(style: ClassStyle) -> rr.AnnotationContext:

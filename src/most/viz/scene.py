@@ -7,7 +7,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from most.datasets.reader import Frame, Reader
-from most.errors import DataError
+from most.errors import DataError, check_entries
 from most.structures import Panoptic, Sweep
 from most.viz.agreement import compare, segments
 from most.viz.classes import ClassStyle
@@ -89,11 +89,7 @@ class _Scene:
 
     def _show_prediction(self, sweep: Sweep, truth: Panoptic | None, path: Path) -> None:
         taxonomy, labels = self.reader.taxonomy, self.reader.read_prediction(path)
-        if len(labels) != len(sweep.points):
-            raise DataError(
-                f"{path}: expected a label for each of the scan's {len(sweep.points)} points, found {len(labels)}; "
-                "predict this scan again"
-            )
+        check_entries(path, len(labels), len(sweep.points))
         prediction = Panoptic(taxonomy.decode(labels, path), taxonomy.instance_of(labels))
         names = segments(prediction, taxonomy.things)
         partners = compare(truth, prediction, taxonomy.things).partners if truth else {}

@@ -11,8 +11,11 @@ from torch import Tensor
 from most.datasets.nuscenes.rigid import numbers, rigid
 from most.datasets.nuscenes.scenes import Scenes
 from most.datasets.nuscenes.tables import Row, Table
+from most.datasets.taxonomy import Taxonomy
 from most.geometry.poses import invert, yaw
+from most.modal.boxes import SequenceBoxes
 
+BOX_TABLES = ("sample_annotation", "instance", "category")
 _ANNOTATION: dict[str, type] = {
     "sample_token": str,
     "instance_token": str,
@@ -36,6 +39,21 @@ class AmodalBoxes:
 
     def __len__(self) -> int:
         return len(self.instances)
+
+
+def join_boxes(frames: list[int], boxes: list[AmodalBoxes], taxonomy: Taxonomy) -> SequenceBoxes:
+    """Return the boxes of a scene's key frames, whose numbers are ``frames``, under one another."""
+    numbers = {token: number for number, token in enumerate(dict.fromkeys(t for one in boxes for t in one.instances))}
+    categories = torch.cat([one.categories for one in boxes])
+    return SequenceBoxes(
+        frames=torch.tensor([frame for frame, one in zip(frames, boxes, strict=True) for _ in one.instances]).long(),
+        objects=torch.tensor([numbers[token] for one in boxes for token in one.instances]).long(),
+        classes=taxonomy.to_training(taxonomy.label.join(categories, torch.zeros_like(categories))),
+        keys=None,
+        centres=torch.cat([one.centres for one in boxes]),
+        half_sizes=torch.cat([one.half_sizes for one in boxes]),
+        yaws=torch.cat([one.yaws for one in boxes]),
+    )
 
 
 class Annotations:

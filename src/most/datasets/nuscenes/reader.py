@@ -11,7 +11,7 @@ from pathlib import Path
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
-from most.datasets.nuscenes.boxes import AmodalBoxes, Annotations
+from most.datasets.nuscenes.boxes import BOX_TABLES, AmodalBoxes, Annotations, join_boxes
 from most.datasets.nuscenes.files import count_points, read_classes, read_panoptic, read_scan, write_panoptic
 from most.datasets.nuscenes.labels import LabelFiles
 from most.datasets.nuscenes.scenes import LidarSweep, Scenes
@@ -20,10 +20,18 @@ from most.datasets.reader import Frame
 from most.datasets.settings import DatasetSettings
 from most.datasets.splits import check_split, present_sequences
 from most.datasets.taxonomy import Taxonomy
-from most.errors import ConfigError, DataError
+from most.errors import ConfigError, DataError, check_entries
+from most.modal.boxes import SequenceBoxes
 from most.structures import Sweep
 
-MODALITIES = {"use_camera": False, "use_lidar": True, "use_radar": False, "use_map": False, "use_external": False}
+META = {  # of a submission; the task of tracking is scored in all figures of segmentation, too
+    "task": "tracking",
+    "use_camera": False,
+    "use_lidar": True,
+    "use_radar": False,
+    "use_map": False,
+    "use_external": False,
+}
 TABLES = ("scene", "sample", "sample_data", "ego_pose", "calibrated_sensor", "sensor", "panoptic")
 
 
@@ -93,6 +101,10 @@ class PanopticNuScenes:
         """The annotated sweeps of a scene, two a second."""
         return [Frame(sequence, index) for index, sweep in enumerate(self._sweeps(sequence)) if sweep.is_key]
 
+    def annotated(self, sequence: str) -> list[Frame]:
+        """The key frames: no other sweep has labels."""
+        return self.key_frames(sequence)
+
     def frames_of(self, sequence: str) -> list[Frame]:
         """All sweeps of a scene, twenty a second."""
         return [Frame(sequence, index) for index in range(len(self._sweeps(sequence)))]
@@ -106,11 +118,8 @@ class PanopticNuScenes:
         row = self._row(frame)
         points = read_scan(self.root / row.filename, row.token)
         labels = self.labels(frame) if row.is_key and self.has_labels(frame.sequence) else None
-        if labels is not None and len(labels) != len(points):
-            raise DataError(
-                f"{self._panoptic.path(row.token)}: expected a label for each of the sweep's {len(points)} points, "
-                f"found {len(labels)}; sweep and labels are of different releases or one is cut off"
-            )
+        if labels is not None:
+            check_entries(self._panoptic.path(row.token), len(labels), len(points))
         return Sweep(frame.sequence, frame.index, points, self.poses(frame.sequence)[frame.index], row.time, labels)
 
     def labels(self, frame: Frame) -> Int64[Tensor, "points"]:
@@ -124,6 +133,16 @@ class PanopticNuScenes:
     def boxes(self, frame: Frame) -> AmodalBoxes:
         """The amodal boxes of a key frame, in its sensor frame; none where nothing is annotated."""
         return self._annotations.boxes(self._row(frame).sample, self.poses(frame.sequence)[frame.index])
+
+    def box_files(self, sequence: str) -> list[Path]:
+        """The tables of annotations; the test version has none."""
+        tables = [self.place / f"{name}.json" for name in BOX_TABLES]
+        return tables if all(path.is_file() for path in tables) else []
+
+    def sequence_boxes(self, sequence: str) -> SequenceBoxes:
+        """The boxes of a scene's key frames; which numbers their things have in its labels, the tables do not say."""
+        frames = self.key_frames(sequence)
+        return join_boxes([frame.index for frame in frames], list(map(self.boxes, frames)), self.taxonomy)
 
     def poses(self, sequence: str) -> Float64[Tensor, "rows 4 4"]:
         """World_from_sensor by frame number, float64; the world is the map's."""
@@ -159,9 +178,9 @@ class PanopticNuScenes:
         write_panoptic(path, labels)
 
     def submission_notes(self, frames: list[Frame]) -> dict[str, bytes]:
-        """``SPLIT/submission.json``: lidar alone was used."""
+        """``SPLIT/submission.json``: it is to be scored as tracking, and lidar alone was used."""
         splits = sorted({self.official_split(frame) for frame in frames})
-        return {f"{split}/submission.json": json.dumps({"meta": MODALITIES}).encode() for split in splits}
+        return {f"{split}/submission.json": json.dumps({"meta": META}).encode() for split in splits}
 
     def official_split(self, frame: Frame) -> str:
         """What submissions call the split of a frame: val, test or train, with ``mini_`` before in the mini version."""

@@ -1,0 +1,65 @@
+"""Lay out or publish the W&B workspace of trainings: ``python -m most.dashboard out=dashboard.json``."""
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import hydra
+from omegaconf import DictConfig
+
+from most.config import conf_dir, register, store_root, typed
+from most.datasets.taxonomy import Taxonomy
+from most.entry import run, start
+from most.errors import ConfigError
+from most.files import atomic_write
+from most.viz.dashboard import describe, layout, workspace
+
+LEARNING_RATES = ("lr-AdamW", "lr-SGD")  # of sim_ablation's optimisers
+
+
+@dataclass
+class DashboardConfig:
+    """What ``most.dashboard`` is told."""
+
+    out: str = "dashboard.json"
+    taxonomy: str = "semantickitti"  # whose classes have curves: its things
+    pictures: int = 2  # as logger.pictures of the trainings
+    publish: bool = False  # needs WANDB_API_KEY and an entity
+    entity: str | None = None  # user or team
+    project: str = "most"
+    name: str = "MOST"  # of the workspace
+
+    def __post_init__(self) -> None:
+        if self.pictures < 0:
+            raise ConfigError(f"pictures: expected a number >= 0, found {self.pictures}")
+        if self.publish and not (self.entity and os.environ.get("WANDB_API_KEY")):
+            raise ConfigError("publish: expected entity=NAME and WANDB_API_KEY in the environment, found one missing")
+
+
+register()
+store_root("dashboard", DashboardConfig)
+
+
+def dashboard(config: DashboardConfig) -> None:
+    """Write the layout to ``out``; where asked to, make the workspace of it."""
+    taxonomy = Taxonomy.load(config.taxonomy)
+    things = [taxonomy.class_names[thing] for thing in taxonomy.things]
+    sections = layout(things, config.pictures, LEARNING_RATES)
+    with atomic_write(Path(config.out), "w") as file:
+        file.write(json.dumps(describe(sections), indent=2) + "\n")
+    print(f"{config.out}: {sum(len(section.panels) for section in sections)} panels in {len(sections)} sections")
+    if config.publish:
+        saved: Any = workspace(sections, str(config.entity), config.project, config.name).save()
+        print(f"published: {saved.url}")
+
+
+@hydra.main(version_base=None, config_path=str(conf_dir()), config_name="dashboard")
+def main(config: DictConfig) -> None:
+    """Compose, check, lay out."""
+    run(lambda: dashboard(typed(config)))
+
+
+if __name__ == "__main__":
+    start(main)

@@ -1,0 +1,13 @@
+"""Where a model runs."""
+
+import torch
+
+from most.errors import ConfigError
+
+
+def chosen_device(name: str) -> torch.device:
+    """Return the device of this name, for ``auto`` a GPU where there is one; a ConfigError where it is not there."""
+    there = torch.cuda.is_available()
+    if name not in ("auto", "cpu", *(["cuda"] if there else [])):
+        raise ConfigError(f"device: expected auto, cpu, or cuda where there is a GPU, found {name}")
+    return torch.device("cuda" if there and name != "cpu" else "cpu")

@@ -1,0 +1,210 @@
+"""The jobs of a sweep: what each is called, whether it can run, what is left of it to do, and how they all ended.
+
+A job's folder is named by its overrides, so the same sweep finds its jobs again: one with ``metrics.json`` is
+finished, one with a ``*-last.ckpt`` goes on from it. ``hydra_plugins.most_sweeper`` multiplies the overrides out.
+"""
+
+import hashlib
+import logging
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+from yaml import YAMLError
+
+from most.checks import flat, stages_to_run
+from most.config import Config, typed
+from most.datasets.reader import Reader
+from most.entry import end
+from most.errors import ConfigError, DataError, FailedError, MostError, StoppedError
+from most.stages.settings import STAGES
+from most.training import METRICS, checkpoint_path
+
+LONGEST = 120  # characters of a folder's name
+NO_FIGURE = (  # settings that change how a run is done, not what it is
+    "logger", "paths", "resume", "name", "dataset.tables", "dataset.workers", "dataset.cache",
+    "trainer.threads", "trainer.progress_bar", "trainer.log_every", "trainer.save_every",
+)  # fmt: skip
+ELSEWHERE = ("experiment", "dataset.root")  # they stand in the sweep's folder, or are too long for a name
+
+log = logging.getLogger(__name__)
+
+
+@dataclass
+class Job:
+    """One combination of a sweep's overrides."""
+
+    arguments: list[str]  # its overrides, as Hydra's launchers take them
+    composed: DictConfig  # with Hydra's own settings
+
+    @property
+    def folder(self) -> Path:
+        """Where the job writes."""
+        sweep = self.composed.hydra.sweep
+        return Path(sweep.dir) / str(sweep.subdir)
+
+    @property
+    def finished(self) -> bool:
+        """Whether there is nothing left to do."""
+        return (self.folder / METRICS).is_file()
+
+    def settings(self) -> DictConfig:
+        """The configuration that the job's training gets, without Hydra's own."""
+        own = self.composed.copy()
+        OmegaConf.set_struct(own, False)
+        del own["hydra"]
+        return own
+
+
+def job_name(overrides: Sequence[str]) -> str:
+    """Return what a job is called, in whatever order it was told: ``extent=track_max+seed=1``, fit for a shell.
+
+    Choices come first: a long name ends in a digest.
+    """
+    told = [override.lstrip("+") for override in overrides]
+    kept = [override for override in told if not _is_of(override.split("=")[0], (*NO_FIGURE, *ELSEWHERE))]
+    kept.sort(key=lambda override: ("." in override or "/" in override, override))
+    name = re.sub(r"[^\w.=+-]", "_", "+".join(kept)) or "default"
+    if len(name) <= LONGEST:
+        return name
+    digest = hashlib.sha256(name.encode()).hexdigest()[:12]
+    return f"{name[: LONGEST - len(digest) - 1]}+{digest}"
+
+
+def check_jobs(jobs: Sequence[Job]) -> None:
+    """Refuse a sweep that a job cannot take part in, before any starts; the message names the first."""
+    readers: dict[str, Reader] = {}  # opening one can take long, and most sweeps have one dataset
+    seen: set[Path] = set()
+    for job in jobs:
+        if job.folder in seen:
+            raise ConfigError(
+                f"{job.folder}: expected jobs that differ in what they train, found two of this name; "
+                f"sweep over something else than {', '.join(NO_FIGURE)}"
+            )
+        seen.add(job.folder)
+        try:
+            _check(job, readers)
+        except MostError as error:
+            raise type(error)(f"job {job.folder.name}: {error}") from error
+
+
+def _check(job: Job, readers: dict[str, Reader]) -> None:
+    _check_beginning(job)
+    if job.finished:
+        return
+    config: Config = typed(job.settings())
+    if config.trainer.processes() > 1:
+        raise ConfigError(
+            f"trainer.devices: expected one process for each job of a sweep, found {config.trainer.processes()}; "
+            "say trainer=gpu, or train the combinations without -m"
+        )
+    config.resume = config.resume or standing(job.folder)
+    key = repr(config.dataset)
+    if key not in readers:
+        readers[key] = config.dataset.reader()
+    stages_to_run(config, readers[key], job.folder)
+
+
+def _check_beginning(job: Job) -> None:
+    """Refuse a folder in which a run of other settings began; those that one of them lacks are of a later version."""
+    written = job.folder / ".hydra"
+    if not (job.finished or standing(job.folder)) or not (written / "config.yaml").is_file():
+        return
+    began = _written(written)
+    now = flat(_plain(job.settings())) | chosen(job.composed.hydra.runtime.choices)
+    for key in began.keys() & now.keys():
+        if began[key] != now[key] and not _is_of(key, NO_FIGURE):
+            raise ConfigError(
+                f"{job.folder} began with {key} = {began[key]}, found {now[key]}; "
+                "repeat the settings it began with, or choose another hydra.sweep.dir"
+            )
+
+
+def _written(folder: Path) -> dict[str, Any]:
+    """Read the settings, by dotted keys, and the choices that Hydra wrote down of a run."""
+    try:
+        settings, hydra = (OmegaConf.load(folder / name) for name in ("config.yaml", "hydra.yaml"))
+        return flat(_plain(settings)) | chosen(hydra.hydra.runtime.choices)
+    except (OSError, OmegaConfBaseException, YAMLError, ValueError, TypeError, AttributeError) as error:
+        raise DataError(
+            f"{folder}: expected the settings that the job began with, found none readable ({error}); "
+            "remove that folder where you know that they were the same, else the job's"
+        ) from error
+
+
+def standing(folder: Path) -> str | None:
+    """Return the checkpoint with which a run in ``folder`` goes on, where it was stopped."""
+    kept = [checkpoint_path(folder, stage, "last") for stage in reversed(STAGES)]
+    return next((str(path) for path in kept if path.is_file()), None)
+
+
+def in_sweep(config: Config, sweep: str, folder: Path) -> Config:
+    """Return a job's configuration: one of a group, named by its folder, it goes on where it was stopped."""
+    config.logger.group = config.logger.group or sweep
+    config.name = folder.name
+    config.resume = config.resume or standing(folder)
+    return config
+
+
+def chosen(choices: Mapping[str, str]) -> dict[str, str]:
+    """Return which member of each group a configuration was composed of, Hydra's own groups left out."""
+    return {group: member for group, member in choices.items() if not group.startswith("hydra/")}
+
+
+def by_key(overrides: Sequence[str]) -> dict[str, str]:
+    """Return what overrides say of which key."""
+    return dict(override.lstrip("+").split("=", 1) for override in overrides if "=" in override)
+
+
+def as_job(work: Callable[[], Any]) -> Any:
+    """Do one job's work; its failure becomes an error that processes can pass on, and its traceback goes to the log."""
+    try:
+        return work()
+    except StoppedError as error:
+        return end("interrupted; repeat the command to go on with the sweep", error.exit_code)
+    except MostError as error:
+        log.error(error)
+        raise MostError(str(error)) from None
+    except Exception as error:
+        log.exception("the job failed")
+        raise MostError(f"{type(error).__name__}: {error}") from None
+
+
+@contextmanager
+def stopping(jobs: Sequence[Job]) -> Iterator[None]:
+    """Say what an interrupted sweep, or one whose launcher lost a process, has reached."""
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        raise StoppedError("interrupted; repeat the command to go on with the sweep", 130) from error
+    except Exception as error:  # each launcher has its own
+        left = [job.folder.name for job in jobs if not job.finished]
+        raise FailedError(
+            f"the launcher stopped ({type(error).__name__}: {error}); repeat the command to go on with "
+            f"{len(left)} of {len(jobs)} jobs: {', '.join(left)}"
+        ) from error
+
+
+def report(jobs: Sequence[Job], results: Sequence[Any]) -> None:
+    """Say which jobs failed, and why; ``results`` are exceptions for those."""
+    ends = zip(jobs, results, strict=True)
+    if failed := [f"{job.folder}: {result}" for job, result in ends if isinstance(result, Exception)]:
+        raise FailedError(
+            "\n  ".join([f"{len(failed)} of {len(jobs)} jobs failed; repeat the command to try them again", *failed])
+        )
+
+
+def _is_of(key: str, groups: Sequence[str]) -> bool:
+    return any(key == group or key.startswith(f"{group}.") for group in groups)
+
+
+def _plain(config: Any) -> dict[str, Any]:
+    plain = OmegaConf.to_container(config)  # environment variables as they were written
+    if not isinstance(plain, dict):
+        raise TypeError(f"no mapping but {type(plain).__name__}")
+    return {str(key): value for key, value in plain.items()}

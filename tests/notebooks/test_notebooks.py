@@ -1,0 +1,60 @@
+"""The notebooks: kept without outputs, and running from the first cell to the last."""
+
+from pathlib import Path
+
+import nbformat
+import pytest
+import torch
+from nbclient import NotebookClient
+from nbformat import NotebookNode
+
+from most.assembly import describe
+from most.datasets.taxonomy import Taxonomy
+from most.membership import PointSegMLPSettings
+from most.simulation import SimulationSettings, simulate
+from most.simulation.settings import SensorSettings
+from tiny import CAR, tiny_parts, tiny_predictor
+
+NOTEBOOKS = sorted((Path(__file__).parents[2] / "notebooks").glob("*.ipynb"))
+FIGURES = {"scan_and_modal_labels": 6, "extent_strategies": 3, "membership_of_neighbours": 2}
+
+
+@pytest.fixture(autouse=True)
+def environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """No data and no checkpoint but the test's own; kernels, IPython and matplotlib write to its folder."""
+    for name in ("SEMANTICKITTI_ROOT", "MOST_CHECKPOINT", "MOST_STREETS"):
+        monkeypatch.delenv(name, raising=False)
+    for name in ("IPYTHONDIR", "JUPYTER_RUNTIME_DIR", "TMPDIR"):
+        monkeypatch.setenv(name, str(tmp_path))
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+
+
+def run(path: Path, folder: Path) -> list[NotebookNode]:
+    """All that the cells of a notebook put out, run in ``folder``; an error in any of them is raised."""
+    notebook = nbformat.read(path, as_version=4)
+    NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(folder)}}).execute()
+    return [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
+
+
+def figures(outputs: list[NotebookNode]) -> int:
+    return sum("image/png" in output.get("data", {}) for output in outputs)
+
+
+def test_all_notebooks_are_known() -> None:
+    assert {path.stem for path in NOTEBOOKS} == set(FIGURES)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_outputs_are_stripped(path: Path) -> None:
+    notebook = nbformat.read(path, as_version=4)
+    nbformat.validate(notebook)
+    for cell in notebook.cells:
+        assert set(cell.metadata) == set()
+        if cell.cell_type == "code":
+            assert (cell.outputs, cell.execution_count) == ([], None)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_every_cell_runs_and_draws(path: Path, tmp_path: Path) -> None:
+    outputs = run(path, tmp_path)
+    assert figures(outputs) == FIGURES[path.stem]

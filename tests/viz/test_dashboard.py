@@ -1,0 +1,48 @@
+"""The dashboard's layout, and the workspace that is made of it."""
+
+import json
+
+import pytest
+
+from most.dashboard import DashboardConfig
+from most.errors import ConfigError
+from most.viz import dashboard
+from most.viz.dashboard import describe, layout, workspace
+
+
+def test_sections_are_those_that_there_is_something_to_show_of():
+    names = [section.name for section in layout(["car"], 2, ["lr-SGD"])]
+    assert names == ["Losses", "Panoptic quality", "By class", "Membership", "Bird's-eye view", "Throughput"]
+    assert "Bird's-eye view" not in [section.name for section in layout(["car"], 0, [])]
+
+
+def test_classes_have_curves_and_pictures_panels_in_both_stages():
+    panels = {panel.title: panel for section in layout(["car", "person"], 2, []) for panel in section.panels}
+    assert panels["class_pq"].keys == ["val/class_pq/car", "val/class_pq/person"]
+    assert panels["membership/bev"].keys == ["membership/val/bev_1", "membership/val/bev_2"]
+    assert panels["pq"].keys == ["val/pq", "membership/val/nearest_pq", "membership/val/pq"]
+
+
+def test_the_workspace_shows_every_key_and_groups_by_extent_and_membership():
+    pytest.importorskip("wandb_workspaces")
+    sections = layout(["car"], 1, ["lr-SGD"])
+    made = workspace(sections, "team", "most", "MOST")
+    published = json.dumps(made._to_model().model_dump(mode="json"))
+    said = describe(sections)
+    keys = [key for section in said["sections"] for panel in section["panels"] for key in panel["keys"]]
+    assert [key for key in keys if key not in published] == []
+    assert [section.name for section in made.sections] == [section["name"] for section in said["sections"]]
+    assert [key.name for key in made.runset_settings.groupby] == said["grouped_by"]
+
+
+def test_publishing_needs_a_key_an_entity_and_the_package(monkeypatch):
+    monkeypatch.delenv("WANDB_API_KEY", raising=False)
+    with pytest.raises(ConfigError, match="publish: expected entity=NAME and WANDB_API_KEY"):
+        DashboardConfig(publish=True, entity="team")
+    monkeypatch.setenv("WANDB_API_KEY", "0" * 40)
+    with pytest.raises(ConfigError, match="publish: expected entity=NAME"):
+        DashboardConfig(publish=True)
+    DashboardConfig(publish=True, entity="team")
+    monkeypatch.setattr(dashboard.importlib, "import_module", lambda name: __import__("no_such_package"))
+    with pytest.raises(ConfigError, match=r"expected the package wandb-workspaces, found none; pip install"):
+        workspace([], "team", "most", "MOST")
