@@ -16,6 +16,7 @@ from most.reports.analysis import Analysis
 from most.reports.formats import latex, markdown
 from most.reports.groups import group
 from most.reports.orders import order_table, verdict
+from most.reports.plots import plots
 from most.reports.runs import find_runs
 from most.reports.table import Table
 from most.reports.tables import ablation_table, benchmark_tables, difference_table
@@ -175,3 +176,17 @@ def test_letters_that_layouts_need_themselves_are_escaped(analysis: Analysis) ->
     table = Table("t", "50 % & a_b", ("c|d",), (), ("x < y",))
     assert r"50 \% \& a\_b" in latex(table)
     assert r"c\|d" in markdown(table)
+
+
+def test_a_bin_without_instances_leaves_a_gap_in_its_curve_alone(tmp_path: Path) -> None:
+    sums = example_sums(0.7, 1)
+    for sequence in sums["sequences"].values():
+        for rows in sequence["distance"].values():
+            rows[-1] = [0] * 20
+    example_run(tmp_path, sums)
+    (found,) = group(find_runs(tmp_path).scored)
+    parts = {"table1": amodalization(found), "table2": memberships(found)}
+    drawn = {plot.name: plot.svg for plot in plots(parts, Analysis(found, 200, 1))}
+    assert set(drawn) == {"extents", "distance", "points", "membership"}
+    marks = {name: drawn[name].count("<use ") for name in ("distance", "points")}
+    assert marks["points"] - marks["distance"] == 3  # seven bins and seven ticks, five bins and six ticks

@@ -133,3 +133,14 @@ def test_two_runs_of_one_strategy_and_seed_are_refused(tmp_path: Path) -> None:
         example_run(tmp_path / name, example_sums(0.7, 1))
     with pytest.raises(DataError, match=r"two: expected one run of track_max.*found another in .*one; keep one"):
         group(find_runs(tmp_path).scored)
+
+
+def test_of_two_scores_of_one_seed_the_tables_take_theirs_and_no_seed_is_lost(tmp_path: Path) -> None:
+    for seed in (1, 2):
+        example_run(tmp_path / f"stage1,{seed}", example_sums(0.7, seed), seed=seed)
+    example_run(tmp_path / "both,1", example_sums(0.7, 1), nearest=example_sums(0.6, 3))
+    (found,) = group(find_runs(tmp_path).scored)
+    nearest = found.strategies[0]
+    assert {seed: run.source for seed, run in found.by_seed(nearest).items()} == {1: "validated", 2: "validated"}
+    beside = found.by_seed(nearest, beside=True)
+    assert {seed: run.source for seed, run in beside.items()} == {1: "beside", 2: "validated"}

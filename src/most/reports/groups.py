@@ -3,7 +3,6 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 from most.errors import DataError
@@ -15,7 +14,7 @@ ASIDE = {  # keys that say who ran it, where and how far it is; or that strategi
     *("seed", "resume", "stage1", "trainer", "logger", "paths", "dataset.root", "dataset.tables", "dataset.workers"),
     *("dataset.cache", "stage.run", "backbone.separate", *AXES),
 }
-SOURCES = (EVALUATED, VALIDATED, BESIDE)  # of two for the same, the first is taken
+SOURCES = (EVALUATED, VALIDATED, BESIDE)  # of two with the same strategy and seed, the first is taken
 
 
 @dataclass
@@ -39,9 +38,12 @@ class Group:
             )
 
     def by_seed(self, strategy: Strategy, beside: bool = False) -> dict[int, Scored]:
-        """Return a strategy's runs from one source; ``beside``: rather those of the run that trained stage 2."""
+        """Return a strategy's runs; of two with a seed, ``beside`` takes that of the run that trained stage 2."""
         sources = (EVALUATED, BESIDE, VALIDATED) if beside else SOURCES
-        return next(self.rows[strategy][source] for source in sources if source in self.rows[strategy])
+        found: dict[int, Scored] = {}
+        for source in reversed(sources):
+            found |= self.rows[strategy].get(source, {})
+        return found
 
     @property
     def strategies(self) -> list[Strategy]:
@@ -98,8 +100,3 @@ def _entitle(groups: Mapping[str, Group], kept: Mapping[str, Mapping[str, Any]])
         differs = [f"{name}={kept[key].get(name)}" for name in told if name not in ("name", "experiment")]
         if differs:
             found.title += f" [{'; '.join(differs[:4])}{'; ...' if len(differs) > 4 else ''}]"
-
-
-def folders(found: Mapping[int, Scored]) -> list[Path]:
-    """Whence a row's figures are."""
-    return [found[seed].folder for seed in sorted(found)]

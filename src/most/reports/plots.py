@@ -3,6 +3,7 @@
 Axes and texts have one ink that no page has; on the page it becomes the text's colour, in light as in dark.
 """
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
@@ -44,8 +45,8 @@ def plots(ablations: Mapping[str, Ablation], analysis: Analysis) -> list[Plot]:
     measured = analysis.group.measured
     found = [
         _bars("extents", "PQ by extent strategy", strategies, analysis, {"PQ": "pq"}),
-        _curves("distance", "PQ of things against distance", strategies, analysis, measured.distance_edges, "m"),
-        _curves("points", "PQ of things against points per instance", strategies, analysis, measured.points_edges, ""),
+        _curves("distance", "PQ of things against distance", strategies, analysis, measured.distance_edges),
+        _curves("points", "PQ of things against points per instance", strategies, analysis, measured.points_edges),
         _bars("membership", "Membership accuracy", ways, analysis,
               {"all": "membership_accuracy", "contested": "membership_accuracy_contested"}),
     ]  # fmt: skip
@@ -91,29 +92,27 @@ def _bar(axes: Axes, at: float, cell: Interval | None, seeds: Iterable[float], s
     axes.plot([100 * cell.value], [at], MARKS[series], color=COLOURS[series], label=label, markersize=7)
 
 
-def _curves(
-    name: str, title: str, ablation: Ablation, analysis: Analysis, edges: Sequence[float], unit: str
-) -> Plot | None:
-    """A curve for each row, a point for each bin, with the interval as a band."""
+def _curves(name: str, title: str, ablation: Ablation, analysis: Analysis, edges: Sequence[float]) -> Plot | None:
+    """A curve for each row, a point for each bin that has instances, with the interval as a band."""
     bins = {str(index): f"{name}/{index}" for index in range(len(edges))}
     found = {}
     for each in ablation.rows.values():
         cells = analysis.cells(ablation.runs(analysis.group, each), bins)
-        if all(cells.values()):
-            found[ablation.title_of(each)] = [cell for cell in cells.values() if cell is not None]
+        if any(cells.values()):
+            found[ablation.title_of(each)] = [cell or Interval(math.nan) for cell in cells.values()]
     if not found:
         return None
-    labels = _bin_names(edges, unit)
+    labels = _bin_names(edges, step=int(name == "points"))
     with mpl.rc_context(STYLE):
-        figure, axes = _figure(3.6)
+        figure, axes = _figure(4.0)
         for series, (row, curve) in enumerate(found.items()):
             _curve(axes, row, curve, series)
         axes.set_xticks(range(len(labels)), labels)
-        axes.set_xlabel("distance of the modal centre" if unit else "points of the instance")
+        axes.set_xlabel("points of the instance" if name == "points" else "distance of the modal centre, m")
         axes.set_ylabel("PQ, %")
         axes.set_ylim(0, 100)
         axes.grid(axis="y", alpha=0.2, color=INK)
-        axes.legend(loc="upper left", bbox_to_anchor=(1, 1))
+        axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
         meaning = f"{title}: all things together, in bins; bands are 95 % intervals. {_official(name)}"
         return Plot(name, title, meaning, _svg(figure, name))
 
@@ -134,11 +133,9 @@ def _curve(axes: Axes, row: str, cells: Sequence[Interval], series: int) -> None
     axes.plot([100 * cell.value for cell in cells], mark + "-", color=colour, label=row, markersize=5)
 
 
-def _bin_names(edges: Sequence[float], unit: str) -> list[str]:
-    """``0 to 10 m`` for a distance, ``1 to 14`` for a number of points, and an open end."""
-    unit, step = (f" {unit}", 0) if unit else ("", 1)
-    ends = [f"{low:g} to {high - step:g}{unit}" for low, high in pairwise(edges)]
-    return [*ends, f"{edges[-1]:g}{unit} on"]
+def _bin_names(edges: Sequence[float], step: int) -> list[str]:
+    """``0-10`` of a distance, ``1-14`` of whole numbers (``step`` 1), and an open end."""
+    return [*(f"{low:g}-{high - step:g}" for low, high in pairwise(edges)), f"{edges[-1]:g} on"]
 
 
 def _said(cells: Mapping[str, Interval | None]) -> str:
