@@ -17,7 +17,7 @@ from most.simulation.settings import SensorSettings
 from tiny import CAR, TAXONOMY, tiny_parts, tiny_predictor
 
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "notebooks").glob("*.ipynb"))
-FIGURES = {"scan_and_modal_labels": 6, "extent_strategies": 3, "membership_of_neighbours": 2}
+FIGURES = {"scan_and_modal_labels": 6, "extent_strategies": 3, "membership_of_neighbours": 3}
 
 
 @pytest.fixture(autouse=True)
@@ -56,17 +56,12 @@ def test_outputs_are_stripped(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_every_cell_runs_and_draws(path: Path, tmp_path: Path) -> None:
-    outputs = run(path, tmp_path)
-    assert figures(outputs) == FIGURES[path.stem]
-
-
-def test_a_trained_model_is_looked_into(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    simulate(SimulationSettings(["10"], 1, sensor=SensorSettings(columns=64, max_range=15.0)), tmp_path / "streets")
-    monkeypatch.setenv("MOST_CHECKPOINT", str(sees_cars_everywhere(tmp_path / "some.ckpt")))
-    monkeypatch.setenv("MOST_STREETS", str(tmp_path / "streets"))
-    path = next(path for path in NOTEBOOKS if path.stem == "membership_of_neighbours")
-    assert figures(run(path, tmp_path)) == FIGURES[path.stem] + 1
+def test_every_cell_runs_and_draws(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if path.stem == "membership_of_neighbours":  # it looks into a trained model, too, where there is one
+        simulate(SimulationSettings(["10"], 1, sensor=SensorSettings(columns=64, max_range=15.0)), tmp_path / "streets")
+        monkeypatch.setenv("MOST_CHECKPOINT", str(sees_cars_everywhere(tmp_path / "some.ckpt")))
+        monkeypatch.setenv("MOST_STREETS", str(tmp_path / "streets"))
+    assert figures(run(path, tmp_path)) == FIGURES[path.stem]
 
 
 def sees_cars_everywhere(path: Path) -> Path:
