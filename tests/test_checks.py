@@ -1,5 +1,6 @@
 """What a training is asked to do is held against what there is, before any work."""
 
+from contextlib import nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -252,3 +253,26 @@ def test_weights_to_begin_with_are_not_for_stage_2(config, reader, tmp_path):
 def test_what_a_run_says_of_itself_is_plain(config):
     said = describe_run(config, "membership", FRAMES)
     assert said["training"] == asdict(config.stage.membership)
+
+
+def test_a_run_whose_stage_1_has_not_ended_is_no_stage_1(config, reader, tmp_path):
+    run = tmp_path / "run"
+    run.mkdir()
+    path = save(config, run, "detection")
+    config.stage1, config.stage.run, config.stage.hand_over = str(run), ["membership"], "last"
+    for done, refused in ((3, True), (4, False)):
+        progress = {"fit_loop": {"epoch_progress": {"current": {"processed": done}}}}
+        torch.save(torch.load(path, weights_only=True) | {"loops": progress}, path)
+        with (
+            pytest.raises(ConfigError, match=r"has ended, found 3 of 4 epochs in .*last\.ckpt")
+            if refused
+            else nullcontext()
+        ):
+            assert stages_to_run(config, reader, tmp_path / "new") == ["membership"]
+
+
+def test_a_stage_1_of_another_extent_is_refused(config, reader, tmp_path):
+    config.stage1, config.stage.run = str(save(config, tmp_path, "detection")), ["membership"]
+    config.extent = DropSmall()
+    with pytest.raises(ConfigError, match=r"another extent: expected .*drop_small.* found .*track_max"):
+        stages_to_run(config, reader, tmp_path / "new")

@@ -6,7 +6,15 @@ from typing import Any
 
 import torch
 
-from most.assembly import check_membership, describe, describe_run, model_parts, read_checkpoint, stage1_parts
+from most.assembly import (
+    check_membership,
+    describe,
+    describe_run,
+    model_parts,
+    read_checkpoint,
+    stage1_parts,
+    stage1_run,
+)
 from most.config import Config, from_plain, from_settings, to_plain
 from most.datasets.augment import Augment
 from most.datasets.instances import check_extent
@@ -16,7 +24,7 @@ from most.errors import ConfigError
 from most.membership import PointSegMLPSettings
 from most.modal.extent import DropSmall
 from most.stages.trainer import TrainerSettings
-from most.training import batches_per_step, stage1_file
+from most.training import batches_per_step, checkpoint_path, stage1_file
 from most.voxels import Grid
 
 NETWORK = ("encoder", "backbone", "centre_head", "semantic_head")
@@ -121,7 +129,13 @@ def check_stage1(config: Config, taxonomy: Taxonomy) -> None:
         raise ConfigError(
             "stage1: expected a checkpoint of stage 1, found none; say stage1=FILE, or train it: stage=both"
         )
-    _check_same(config, taxonomy, "stage1", ("taxonomy", "sweeps"), STAGE1)
+    saved = _check_same(config, taxonomy, "stage1", ("taxonomy", "sweeps"), STAGE1)
+    wanted, known = to_plain("extent", config.extent), stage1_run(saved).get("extent")
+    if known is not None and (found := _completed_part("extent", known)) != wanted:
+        raise ConfigError(
+            f"stage1: {config.stage1} was trained with another extent: expected {wanted}, found {found}; "
+            "repeat the settings that it was trained with"
+        )
 
 
 def check_weights(config: Config, taxonomy: Taxonomy) -> None:
@@ -131,7 +145,7 @@ def check_weights(config: Config, taxonomy: Taxonomy) -> None:
     if "detection" not in config.stage.run:
         raise ConfigError("weights: expected none where stage 1 is not trained; say stage=detection or stage=both")
     saved = _check_same(config, taxonomy, "weights", ("taxonomy",), NETWORK)
-    trained: Grid = from_plain("grid", saved["parts"]["grid"])
+    trained: Grid = from_plain("grid", saved["most"]["parts"]["grid"])
     if trained.shape[2] != config.grid.shape[2]:
         raise ConfigError(
             f"weights: expected a grid of as many layers as this one, {config.grid.shape[2]}, "
@@ -142,12 +156,16 @@ def check_weights(config: Config, taxonomy: Taxonomy) -> None:
 def _check_same(
     config: Config, taxonomy: Taxonomy, key: str, told: tuple[str, ...], parts: tuple[str, ...]
 ) -> dict[str, Any]:
-    """Return what the checkpoint under ``key`` says of its model; another than the configuration's is a ConfigError.
+    """Return the checkpoint under ``key``; one of another model than the configuration's is a ConfigError.
 
     ``told`` names what it says of itself that has to agree, ``parts`` the components that have to.
     """
-    path = stage1_file(config, Path(getattr(config, key)))
-    saved, expected = read_checkpoint(path)["most"], describe(model_parts(config), taxonomy, config.dataset.sweeps)
+    place = Path(getattr(config, key))
+    path = stage1_file(config, place)
+    if place.is_dir():
+        check_ended(key, checkpoint_path(place, "detection", "last"))
+    checkpoint, expected = read_checkpoint(path), describe(model_parts(config), taxonomy, config.dataset.sweeps)
+    saved = checkpoint["most"]
     pairs = {name: (expected[name], saved[name]) for name in told}
     pairs |= {name: (expected["parts"][name], _completed_part(name, saved["parts"][name])) for name in parts}
     for name, (wanted, found) in pairs.items():
@@ -156,7 +174,19 @@ def _check_same(
                 f"{key}: {path} was trained with another {name}: expected {wanted}, found {found}; "
                 "repeat the settings that it was trained with"
             )
-    return saved
+    return checkpoint
+
+
+def check_ended(key: str, last: Path) -> None:
+    """Refuse a run whose stage 1 has not ended: ``last`` is its newest checkpoint."""
+    checkpoint = read_checkpoint(last)
+    done = checkpoint["loops"]["fit_loop"]["epoch_progress"]["current"]["processed"]
+    epochs = checkpoint["most_run"]["training"]["epochs"]
+    if done < epochs:
+        raise ConfigError(
+            f"{key}: expected a run whose stage 1 has ended, found {done} of {epochs} epochs in {last}; "
+            "let it end first, or name a checkpoint"
+        )
 
 
 def _completed(saved: dict[str, Any], config: Config) -> dict[str, Any]:

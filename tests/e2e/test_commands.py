@@ -83,7 +83,7 @@ def test_every_key_of_the_dashboard_is_one_that_a_training_logs(run, logged):
     assert len(keys) > 40
     assert [key for key in keys if not logged.logged(key)] == []
     assert all(name in logged.config["choices"] for name in ("extent", "membership"))
-    assert said["grouped_by"] == ["choices.extent", "choices.membership"]
+    assert said["grouped_by"] == ["choices.extent", "choices.membership", "choices.heads", "backbone.separate"]
 
 
 def test_predictions_cover_every_point_and_are_scored(run):
