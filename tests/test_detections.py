@@ -85,3 +85,13 @@ def test_what_lies_along_a_turned_box_goes_and_what_lies_beside_it_stays():
     peaks = (0, 0, 3, 3, 0.9), (0, 0, 5, 5, 0.8), (0, 0, 5, 1, 0.7)
     (found,) = PeakDetector(overlap=1.0)(turned(*peaks, yaw=math.pi / 4, size=(4.0, 0.5, 1.0)), [1, 2], GRID)
     assert found.scores.tolist() == pytest.approx([0.9, 0.7])
+
+
+@pytest.mark.parametrize(("second", "kept"), [(0.0, 2), (math.pi / 2, 1)])
+def test_a_box_across_another_reaches_over_it(second, kept):
+    """Boxes 8 m by 1 m, two cells apart across the first: beside each other, or the second over the first."""
+    crossing = turned((0, 0, 3, 3, 0.9), (0, 0, 3, 5, 0.8), yaw=0.0, size=(4.0, 0.5, 1.0))
+    crossing.yaw = crossing.yaw.clone()
+    crossing.yaw[0, :, 3, 5] = torch.tensor([math.sin(2 * second), math.cos(2 * second)])
+    (found,) = PeakDetector(overlap=1.0)(crossing, [1, 2], GRID)
+    assert len(found) == kept

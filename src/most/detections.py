@@ -8,7 +8,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from most.errors import ConfigError
-from most.geometry.boxes import along
+from most.geometry.boxes import along, bounds
 from most.structures import BevMaps, Detections
 from most.voxels import BevGrid
 
@@ -52,13 +52,22 @@ class PeakDetector:
     def _kept(self, found: Detections) -> Bool[Tensor, "detections"]:
         """Greedily drop each centre that lies inside a more confident one of its class (boxes seen from above)."""
         distance = along(found.centres[:, None] - found.centres[None], found.yaws)[..., :2].abs()
-        reach = self.overlap * torch.maximum(found.extents[:, None, :2], found.extents[None, :, :2])
+        reach = self.overlap * torch.maximum(_in_axes_of_each(found)[..., :2], found.extents[None, :, :2])
         covers = (distance < reach).all(2) & (found.classes[:, None] == found.classes[None])
         covered_by = covers.cpu().tril(-1)
         kept = torch.ones(len(found), dtype=torch.bool)
         for weaker in range(1, len(found)):
             kept[weaker] = not (covered_by[weaker] & kept).any()
         return kept.to(found.scores.device)
+
+
+def _in_axes_of_each(found: Detections) -> Float[Tensor, "detections detections 3"]:
+    """Return the half-sizes of box i along the axes of box j, m."""
+    count = len(found)
+    if found.yaws is None:
+        return found.extents[:, None].expand(-1, count, -1)
+    turns = (found.yaws[:, None] - found.yaws[None]).flatten()
+    return bounds(found.extents.repeat_interleave(count, 0), turns).view(count, count, 3)
 
 
 def _window(maps: BevMaps, index: int) -> BevMaps:

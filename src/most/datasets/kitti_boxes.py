@@ -1,7 +1,5 @@
 """``boxes.npz`` beside a simulated sequence in SemanticKITTI's layout: amodal boxes, which the dataset itself lacks."""
 
-import zipfile
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +9,13 @@ from torch import Tensor
 
 from most.datasets.taxonomy import Taxonomy
 from most.errors import DataError
+from most.files import NO_ARCHIVE
 from most.geometry.poses import invert, yaw
 from most.modal.boxes import SequenceBoxes
 
 WIDTHS = {"scan": (), "instance": (), "label": (), "centre": (3,), "half_size": (3,), "yaw": ()}
 INTEGERS = ("scan", "instance", "label")
 _REMEDY = "simulate the sequence again"
-_NO_ARCHIVE = (  # all that numpy and zipfile stumble with over foreign bytes
-    OSError, EOFError, ValueError, KeyError, TypeError, RuntimeError, zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
 
 
 def read_boxes(path: Path, poses: Float64[Tensor, "scans 4 4"], taxonomy: Taxonomy) -> SequenceBoxes:
@@ -51,7 +47,7 @@ def _arrays(path: Path) -> dict[str, np.ndarray]:
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in WIDTHS}
-    except _NO_ARCHIVE as error:
+    except NO_ARCHIVE as error:
         raise DataError(f"{path}: expected the arrays {', '.join(WIDTHS)}, found none ({error}); {_REMEDY}") from error
     for name, width in WIDTHS.items():
         kinds = "iu" if name in INTEGERS else "f"

@@ -2,8 +2,6 @@
 
 import hashlib
 import json
-import zipfile
-import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -14,7 +12,7 @@ import torch
 from tqdm import tqdm
 
 from most.errors import DataError
-from most.files import atomic_write
+from most.files import NO_ARCHIVE, atomic_write
 from most.modal.boxes import InstanceBoxes, SequenceBoxes, boxes_of_rows
 from most.modal.build import LabelRules, build_table
 from most.modal.instances import InstanceTable
@@ -23,9 +21,6 @@ from most.structures import Sweep
 
 Kept = TypeVar("Kept", InstanceTable, InstanceBoxes)
 FORMAT = 1  # of the file and of the numbers in it: count up when either changes
-_UNREADABLE = (  # all that numpy and zipfile stumble with over foreign bytes
-    OSError, EOFError, ValueError, KeyError, TypeError, RuntimeError, zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
 
 
 def fingerprint(files: Sequence[Path], contents: Sequence[Path], settings: Mapping[str, Any]) -> str:
@@ -84,7 +79,7 @@ def load(kind: type[Kept], path: Path, made_from: str) -> Kept | None:
             return _unflatten(
                 kind, {name: torch.from_numpy(arrays[name]) for name in arrays.files if name != "made_from"}
             )
-    except _UNREADABLE:
+    except NO_ARCHIVE:
         return None
 
 

@@ -4,8 +4,6 @@ A sweep is rows of float32 x, y, z (m, sensor frame: x right, y ahead), intensit
 are a uint8 a point, panoptic labels a uint16 a point: class * 1000 + instance, in the archive's array ``data``.
 """
 
-import zipfile
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +12,10 @@ from jaxtyping import Float32, Int64
 from torch import Tensor
 
 from most.errors import DataError
-from most.files import atomic_write
+from most.files import NO_ARCHIVE, atomic_write
 
 POINT = np.dtype(("<f4", 5))
 BRIGHTEST = 255.0
-_NO_ARCHIVE = (  # all that numpy and zipfile stumble with over foreign bytes
-    OSError, EOFError, ValueError, KeyError, TypeError, RuntimeError, zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
 
 
 def read_scan(path: Path, token: str) -> Float32[Tensor, "points 4"]:
@@ -62,7 +57,7 @@ def read_panoptic(path: Path) -> Int64[Tensor, "points"]:
     try:
         with np.load(path, allow_pickle=False) as archive:
             labels = archive["data"]
-    except _NO_ARCHIVE as error:
+    except NO_ARCHIVE as error:
         raise DataError(
             f"{path}: expected an archive with the array data, found something else ({error}); copy it again"
         ) from error
