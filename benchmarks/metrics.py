@@ -17,7 +17,8 @@ import numpy as np
 import torch
 from plain_metrics import Labels, PlainLSTQ, PlainPanoptic, PlainTracking
 
-from most.metrics import PanopticQuality, PanopticTracking, SemanticKITTILSTQ
+from most.metrics.running import PanopticQuality
+from most.metrics.running_tracking import PanopticTracking, SemanticKITTILSTQ
 
 SEQUENCE, TURN = 40, 10  # scans
 BEAMS = 64

@@ -1,16 +1,14 @@
-"""Lightning loggers: W&B (offline unless asked), CSV, or none; and the files of a finished run as W&B artifacts."""
+"""Lightning loggers: W&B (offline unless asked), CSV, or none."""
 
 import os
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import wandb
-from lightning.pytorch.loggers import CSVLogger, Logger, WandbLogger
-from lightning.pytorch.utilities import rank_zero_only
+from typing import TYPE_CHECKING, Any
 
 from most.errors import ConfigError
+
+if TYPE_CHECKING:
+    from lightning.pytorch.loggers import Logger
 
 KINDS = ("wandb", "csv", "none")
 
@@ -33,8 +31,10 @@ class LoggerSettings:
         if self.pictures < 0:
             raise ConfigError(f"logger.pictures: expected a number >= 0, found {self.pictures}")
 
-    def build(self, folder: Path, name: str, config: dict[str, Any]) -> Logger | bool:
+    def build(self, folder: Path, name: str, config: dict[str, Any]) -> "Logger | bool":
         """Start the logger of a run whose files go to ``folder``."""
+        from lightning.pytorch.loggers import CSVLogger, WandbLogger  # seconds, which only a training has to wait
+
         if self.kind == "none":
             return False
         if self.kind == "csv":
@@ -42,15 +42,3 @@ class LoggerSettings:
         online = self.mode == "online" and "WANDB_API_KEY" in os.environ
         os.environ["WANDB_MODE"] = "online" if online else "offline"  # WandbLogger's own switch refuses log_model
         return WandbLogger(name=name, save_dir=folder, project=self.project, group=self.group, config=config)
-
-
-@rank_zero_only
-def log_artifacts(logger: Logger | bool, files: Mapping[str, Sequence[Path]]) -> None:
-    """Tell W&B of a run's files, by kind; those that are not there are left out. Offline they stay where they are."""
-    if not isinstance(logger, WandbLogger):
-        return
-    for kind, paths in files.items():
-        artifact = wandb.Artifact(f"{kind}-{logger.experiment.id}", kind)
-        for path in filter(Path.is_file, paths):
-            artifact.add_file(str(path), policy="immutable")  # a reference: checkpoints are large
-        logger.experiment.log_artifact(artifact)

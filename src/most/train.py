@@ -16,8 +16,8 @@ from most.checks import stages_to_run
 from most.config import Config, conf_dir, register, typed
 from most.datasets.datamodule import SweepDataModule
 from most.entry import run, start
-from most.logs import log_artifacts
 from most.metrics.report import write_report
+from most.stages.artifacts import log_artifacts
 from most.stages.stage import Stage
 from most.sweeps import as_job, by_key, chosen, in_sweep
 from most.training import METRICS, build_stage, build_trainer, run_files, stage1_file

@@ -8,7 +8,8 @@ import pytest
 import torch
 
 from most.datasets.taxonomy import Taxonomy
-from most.metrics import NuScenesLSTQ, PanopticQuality, PanopticTracking
+from most.metrics.running import PanopticQuality
+from most.metrics.running_tracking import NuScenesLSTQ, PanopticTracking
 from oracles.devkit import devkit, needs_devkit
 from random_scenes import RandomScenes, random_scenes
 

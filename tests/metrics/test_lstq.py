@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from golden_cases import golden_paths, name_of, read_golden
-from most.metrics import NuScenesLSTQ, SemanticKITTILSTQ
+from most.metrics.running_tracking import NuScenesLSTQ, SemanticKITTILSTQ
 from scan_stretches import Scan, renamed, scan_of, sequences_of_scans
 
 pytestmark = pytest.mark.filterwarnings("ignore:The ``compute`` method")  # of torchmetrics: before any update

@@ -6,7 +6,8 @@ import torch
 from torch import distributed, multiprocessing
 
 from golden_cases import FOLDER, GoldenScan, read_golden
-from most.metrics import NuScenesLSTQ, PanopticQuality, PanopticTracking, SemanticKITTILSTQ
+from most.metrics.running import PanopticQuality
+from most.metrics.running_tracking import NuScenesLSTQ, PanopticTracking, SemanticKITTILSTQ
 
 WORLD = 2
 NAMES, THINGS = ["void", *(str(index) for index in range(1, 17))], range(1, 11)

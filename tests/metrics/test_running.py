@@ -4,8 +4,8 @@ import pytest
 import torch
 from torch import Tensor
 
-from most.metrics import MembershipAccuracy, PanopticQuality
 from most.metrics.panoptic import PanopticStatistics, panoptic_figures, panoptic_statistics, per_class
+from most.metrics.running import MembershipAccuracy, PanopticQuality
 from most.structures import Detections, Instances
 
 NAMES = ["void", "car", "person", "road"]

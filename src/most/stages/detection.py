@@ -1,7 +1,6 @@
 """Stage 1: the detection and segmentation network, trained jointly (paper, implementation details)."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from typing import Any
 
 import torch
@@ -10,10 +9,8 @@ from lightning.pytorch.utilities.types import OptimizerLRSchedulerConfig
 from torch import Tensor
 
 from most.datasets.taxonomy import Taxonomy
-from most.errors import ConfigError
 from most.inference import Predictor
 from most.losses import (
-    LossWeights,
     class_weights,
     focal_loss,
     lovasz_loss,
@@ -21,41 +18,14 @@ from most.losses import (
     regression_losses,
     semantic_loss,
 )
-from most.modal.heatmap import HeatmapTargets
 from most.modal.offsets import centre_offsets
 from most.modal.targets import bev_targets
 from most.modal.voxel_labels import majority
 from most.network import NetworkOutput
 from most.stages.scores import Scores
+from most.stages.settings import DetectionTraining
 from most.stages.stage import Stage
 from most.structures import BevMaps, Sample
-
-
-@dataclass
-class DetectionTraining:
-    """Optimiser, schedule and losses of stage 1; the defaults are the paper's."""
-
-    optimizer: str = "adam"
-    max_lr: float = 1e-3
-    weight_decay: float = 0.01
-    warm_up: float = 0.4  # share of the steps in which the rate rises (one-cycle)
-    initial_divisor: float = 10.0  # the rate starts at max_lr / initial_divisor
-    clip: float = 35.0  # norm of the gradient
-    batch_size: int = 8  # effective: scans an optimiser step, over all accumulated batches
-    epochs: int = 20
-    targets: HeatmapTargets = field(default_factory=HeatmapTargets)
-    losses: LossWeights = field(default_factory=LossWeights)
-
-    def __post_init__(self) -> None:
-        if self.optimizer not in ("adam", "adamw"):
-            raise ConfigError(f"stage.detection.optimizer: expected adam or adamw, found {self.optimizer}")
-        if not 0 < self.warm_up < 1:
-            raise ConfigError(f"stage.detection.warm_up: expected a share in (0, 1), found {self.warm_up}")
-        for name in ("max_lr", "initial_divisor", "clip", "batch_size", "epochs"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"stage.detection.{name}: expected a positive number, found {getattr(self, name)}")
-        if not self.weight_decay >= 0:
-            raise ConfigError(f"stage.detection.weight_decay: expected a number >= 0, found {self.weight_decay}")
 
 
 class DetectionStage(Stage):

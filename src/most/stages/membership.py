@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import torch
@@ -12,12 +12,10 @@ from lightning.pytorch.core.optimizer import LightningOptimizer
 from torch import Tensor
 
 from most.datasets.taxonomy import Taxonomy
-from most.errors import ConfigError
 from most.inference import Predictor
 from most.membership import (
     Evidence,
     LabelledPairs,
-    Mixing,
     Nearest,
     PairPool,
     PointSegMLP,
@@ -26,33 +24,9 @@ from most.membership import (
 )
 from most.processes import mean_over_all
 from most.stages.scores import Scores
+from most.stages.settings import MembershipTraining
 from most.stages.stage import Stage
 from most.structures import Sample
-
-
-@dataclass
-class MembershipTraining:
-    """Optimiser and length of stage 2; the defaults are the paper's."""
-
-    lr: float = 5e-4
-    momentum: float = 0.9
-    batch_size: int = 8  # scans that stage 1 sees before the optimiser steps, over all processes
-    epochs: int = 20
-    mixing: Mixing = field(default_factory=Mixing)
-    average: float = 0.0  # decay, each step, of the weights' running mean, which predicts; 0: the last weights do
-
-    def __post_init__(self) -> None:
-        for name in ("lr", "batch_size", "epochs"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"stage.membership.{name}: expected a positive number, found {getattr(self, name)}")
-        if 0 < self.mixing.scans < self.batch_size:
-            raise ConfigError(
-                f"stage.membership.mixing.scans: expected 0, or at least stage.membership.batch_size = "
-                f"{self.batch_size}, found {self.mixing.scans}"
-            )
-        for name in ("momentum", "average"):
-            if not 0 <= getattr(self, name) < 1:
-                raise ConfigError(f"stage.membership.{name}: expected a number in [0, 1), found {getattr(self, name)}")
 
 
 class MembershipStage(Stage):
