@@ -130,12 +130,9 @@ def check_stage1(config: Config, taxonomy: Taxonomy) -> None:
             "stage1: expected a checkpoint of stage 1, found none; say stage1=FILE, or train it: stage=both"
         )
     saved = _check_same(config, taxonomy, "stage1", ("taxonomy", "sweeps"), STAGE1)
-    wanted, known = to_plain("extent", config.extent), stage1_run(saved).get("extent")
-    if known is not None and (found := _completed_part("extent", known)) != wanted:
-        raise ConfigError(
-            f"stage1: {config.stage1} was trained with another extent: expected {wanted}, found {found}; "
-            "repeat the settings that it was trained with"
-        )
+    if (extent := stage1_run(saved).get("extent")) is not None:
+        trained_with = _completed_part("extent", extent)
+        _check_equal("stage1", config.stage1, "extent", to_plain("extent", config.extent), trained_with)
 
 
 def check_weights(config: Config, taxonomy: Taxonomy) -> None:
@@ -169,17 +166,23 @@ def _check_same(
     pairs = {name: (expected[name], saved[name]) for name in told}
     pairs |= {name: (expected["parts"][name], _completed_part(name, saved["parts"][name])) for name in parts}
     for name, (wanted, found) in pairs.items():
-        if wanted != found:
-            raise ConfigError(
-                f"{key}: {path} was trained with another {name}: expected {wanted}, found {found}; "
-                "repeat the settings that it was trained with"
-            )
+        _check_equal(key, path, name, wanted, found)
     return checkpoint
 
 
+def _check_equal(key: str, place: str | Path, name: str, wanted: Any, found: Any) -> None:
+    if wanted != found:
+        raise ConfigError(
+            f"{key}: {place} was trained with another {name}: expected {wanted}, found {found}; "
+            "repeat the settings that it was trained with"
+        )
+
+
 def check_ended(key: str, last: Path) -> None:
-    """Refuse a run whose stage 1 has not ended: ``last`` is its newest checkpoint."""
+    """Refuse a run whose stage 1 has not ended: ``last`` is its newest checkpoint, unless it holds weights alone."""
     checkpoint = read_checkpoint(last)
+    if "loops" not in checkpoint:
+        return
     done = checkpoint["loops"]["fit_loop"]["epoch_progress"]["current"]["processed"]
     epochs = checkpoint["most_run"]["training"]["epochs"]
     if done < epochs:
