@@ -43,12 +43,14 @@ class SemanticLogits(nn.Module):
         """Return the logits of voxels and points; ``point_cell`` counts BEV cells over (batch, x, y)."""
         voxel_logits = self.voxel(voxel_features)
         if self.point is None:
-            return voxel_logits, voxel_logits[point_voxel]
+            return voxel_logits, voxel_logits.index_select(0, point_voxel)
         # A linear layer over a concatenation is a sum of linear layers: each is applied where its input lives, and
-        # the few logits are gathered instead of the many features.
+        # the few logits are gathered instead of the many features. `index_select` adds its gradients up in one order;
+        # indexing would, on several threads, in another one every time.
         widths = [voxel_logits.shape[1], point_features.shape[1], bev.shape[1]]
         by_voxel, by_point, by_bev = self.point.weight.split(widths, dim=1)
         of_voxels = nn.functional.linear(voxel_logits, by_voxel, self.point.bias)
         of_cells = nn.functional.linear(bev.permute(0, 2, 3, 1).flatten(0, 2), by_bev)
-        refined = nn.functional.linear(point_features, by_point) + of_voxels[point_voxel] + of_cells[point_cell]
+        refined = nn.functional.linear(point_features, by_point)
+        refined = refined + of_voxels.index_select(0, point_voxel) + of_cells.index_select(0, point_cell)
         return voxel_logits, refined
