@@ -186,6 +186,28 @@ def test_a_jobs_failure_can_be_passed_on(error, message):
     assert str(pickle.loads(pickle.dumps(failure.value))) == str(failure.value)
 
 
+def test_a_job_that_failed_twice_says_what_it_failed_at_first():
+    def work():
+        try:
+            raise ZeroDivisionError("division by zero")
+        finally:
+            raise RuntimeError("cannot clean up")
+
+    with pytest.raises(MostError, match="ZeroDivisionError: division by zero"):
+        as_job(work)
+
+
+def test_a_job_that_says_why_is_taken_at_its_word():
+    def work():
+        try:
+            raise KeyError("tr")
+        except KeyError as error:
+            raise RuntimeError("no calibration") from error
+
+    with pytest.raises(MostError, match="RuntimeError: no calibration"):
+        as_job(work)
+
+
 def test_a_job_that_ends_well_returns_what_it_reached():
     assert as_job(lambda: 0.5) == 0.5
 

@@ -173,7 +173,8 @@ def as_job(work: Callable[[], Any]) -> Any:
         raise MostError(str(error)) from None
     except Exception as error:
         log.exception("the job failed")
-        raise MostError(f"{type(error).__name__}: {error}") from None
+        first = _first(error)
+        raise MostError(f"{type(first).__name__}: {first}") from None
 
 
 @contextmanager
@@ -198,6 +199,13 @@ def report(jobs: Sequence[Job], results: Sequence[Any]) -> None:
         raise FailedError(
             "\n  ".join([f"{len(failed)} of {len(jobs)} jobs failed; repeat the command to try them again", *failed])
         )
+
+
+def _first(error: BaseException) -> BaseException:
+    """Return what went wrong first, where cleaning up after it failed as well."""
+    while error.__context__ is not None and not error.__suppress_context__:
+        error = error.__context__
+    return error
 
 
 def _is_of(key: str, groups: Sequence[str]) -> bool:

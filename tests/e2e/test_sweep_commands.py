@@ -60,7 +60,8 @@ def continued(killed: Path) -> Path:
     third.mkdir()
     (third / "checkpoints").touch()
     os.utime(first / "metrics.json", (0, 0))
-    arguments = ["stage=detection", "extent=shrink_wrap,track_max", "seed=1,2", "hydra/launcher=processes"]
+    arguments = ["stage=detection", "extent=shrink_wrap,track_max", "seed=1,2", "hydra/launcher=processes",
+                 "dataset.workers=1"]  # fmt: skip
     done = sweep(killed, *arguments)
     assert done.returncode == 1
     assert "4 jobs, 1 of them finished before" in done.stdout

@@ -1,3 +1,4 @@
+import pytest
 import torch
 
 from most.heads import CentreHead, OffsetHead, OrientedCentreHead, SemanticHead
@@ -32,6 +33,27 @@ def test_without_refinement_points_read_their_voxel():
     index = torch.tensor([1, 1, 0])
     voxel_logits, point_logits = head(torch.randn(2, 4), torch.randn(3, 2), torch.randn(1, 5, 1, 1), index, index * 0)
     assert torch.equal(point_logits, voxel_logits[index])
+
+
+@pytest.mark.parametrize("refined", [False, True])
+def test_gradients_are_the_same_every_time_on_several_threads(refined: bool):
+    torch.manual_seed(0)
+    head = SemanticHead(refine_points=refined).build(classes=3, voxel_channels=4, point_channels=2, bev_channels=5)
+    voxels, points = torch.randn(9, 4, requires_grad=True), torch.randn(200_000, 2)
+    bev, direction = torch.randn(1, 5, 3, 3, requires_grad=True), torch.randn(200_000, 3)
+    many_to_few = torch.randint(9, (200_000,))
+
+    def gradients() -> list[torch.Tensor]:
+        _, point_logits = head(voxels, points, bev, many_to_few, many_to_few)
+        return list(torch.autograd.grad((point_logits * direction).sum(), [voxels, bev][: 1 + refined]))
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        first = gradients()
+        assert all(torch.equal(a, b) for _ in range(4) for a, b in zip(first, gradients(), strict=True))
+    finally:
+        torch.set_num_threads(before)
 
 
 def test_only_an_oriented_head_has_a_yaw_and_no_more_weights_than_it_needs():

@@ -8,6 +8,7 @@ from torch.utils.data import DataLoader
 from most.datasets.augment import Augment
 from most.datasets.dataset import WindowDataset
 from most.datasets.instances import InstanceTables
+from most.datasets.loaders import start_method
 from most.datasets.nuscenes import PanopticNuScenes
 from most.datasets.reader import Reader
 from most.datasets.sampler import EpochSampler, OrderedSampler
@@ -91,6 +92,7 @@ class SweepDataModule(L.LightningDataModule):
             batch_size,
             sampler=sampler,
             num_workers=self.settings.workers,
+            multiprocessing_context=start_method(self.settings.workers),
             persistent_workers=self.settings.workers > 0,
             collate_fn=list,
             worker_init_fn=_leave_interrupts_to_the_main_process,

@@ -6,6 +6,7 @@ from itertools import groupby
 
 from torch.utils.data import DataLoader, IterableDataset
 
+from most.datasets.loaders import start_method
 from most.datasets.reader import Frame, Reader
 from most.datasets.windows import SlidingWindow, Window
 
@@ -34,4 +35,6 @@ class WindowStream(IterableDataset[Window]):
 
     def load(self, ahead: bool) -> DataLoader[Window]:
         """Iterate over it, in a process of its own where that is to read ``ahead``."""
-        return DataLoader(self, batch_size=None, num_workers=int(ahead))
+        workers = int(ahead)
+        context = start_method(workers)
+        return DataLoader(self, batch_size=None, num_workers=workers, multiprocessing_context=context)
