@@ -42,13 +42,11 @@ register()
 store_root("oracle", OracleConfig)
 
 
-def look_of(
-    config: OracleConfig, trained: Trained | None, taxonomy: Taxonomy, device: torch.device
-) -> tuple[Look, int]:
+def look_of(config: OracleConfig, trained: Trained | None, read: Taxonomy, device: torch.device) -> tuple[Look, int]:
     """Return what looks at the sweeps, and how many previous ones it needs."""
     if trained is None:
-        return NoModel(config.grid, config.inference, taxonomy.num_classes), 0
-    check_taxonomy(trained.taxonomy, taxonomy)
+        return NoModel(config.grid, config.inference, read.num_classes), 0
+    check_taxonomy(trained.taxonomy, read)
     for module in trained.predictor.modules().values():
         module.to(device)
     return ModelLook(trained.predictor, trained.likely_targets()), trained.sweeps
@@ -58,8 +56,7 @@ def oracle(config: OracleConfig) -> None:
     """Write every row's report to ``out`` and print the main figures."""
     if config.checkpoint is not None:
         refuse_idle(("grid", "inference"), "with a checkpoint, which has its own")
-    dataset, reader = config.dataset, config.dataset.reader()
-    device = chosen_device(config.device)
+    dataset, reader, device = config.dataset, config.dataset.reader(), chosen_device(config.device)
     trained = None if config.checkpoint is None else load_trained(Path(config.checkpoint))
     look, previous = look_of(config, trained, reader.taxonomy, device)
     extent = config.extent or (trained.likely_extent() if trained else TrackMax())
@@ -68,10 +65,8 @@ def oracle(config: OracleConfig) -> None:
     tables = InstanceTables(reader, extent, dataset.tables)
     ladder = Ladder(reader.taxonomy, tables, look, config.tracker, device)
     climb(ladder, reader, config.split, previous, ahead=dataset.workers > 0)
-    rows = ladder.report()
-    write_report(
-        Path(config.out), {"checkpoint": config.checkpoint, "extent": to_plain("extent", extent), "rows": rows}
-    )
+    rows, told = ladder.report(), {"checkpoint": config.checkpoint, "extent": to_plain("extent", extent)}
+    write_report(Path(config.out), told | {"rows": rows})
     print(format_ladder(rows))
 
 
