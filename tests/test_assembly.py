@@ -12,6 +12,8 @@ from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError, DataError
 from most.heads import OffsetHead, OrientedCentreHead, SemanticHead, VoxelOffsets
 from most.membership import Clustering, MeanShift, Nearest, PointSegMLPSettings
+from most.modal.amodal import Amodal
+from most.modal.extent import TrackMax
 from most.modal.heatmap import HeatmapTargets
 from tiny import CAR, TAXONOMY, cloud, street, tiny_parts, tiny_predictor, window
 
@@ -96,6 +98,34 @@ def test_a_checkpoint_of_either_stage_says_how_heat_maps_were_drawn(tmp_path, to
             assert trained.likely_targets() == HeatmapTargets()
     else:
         assert trained.likely_targets() == targets
+
+
+BOXES = {"component": "amodal", "settings": {"floor": 0.1}}
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        {"most_run": {"stage": "detection", "extent": BOXES}},
+        {"most_run": {"stage": "membership"}, "most_stage1": {"stage": "detection", "extent": BOXES}},
+    ],
+)
+def test_a_checkpoint_of_either_stage_says_how_large_instances_were(tmp_path, told):
+    trained = load_trained(save(tmp_path, checkpoint(tiny_predictor()) | told))
+    assert trained.extent == trained.likely_extent() == Amodal(floor=0.1)
+
+
+def test_where_a_checkpoint_does_not_say_instances_are_as_large_as_their_tracks(tmp_path):
+    trained = load_trained(save(tmp_path, checkpoint(tiny_predictor())))
+    with pytest.warns(UserWarning, match="does not say how large instances were: track_max is taken"):
+        assert trained.likely_extent() == TrackMax()
+
+
+@pytest.mark.parametrize("extent", [{"component": "square"}, {"component": "amodal", "settings": {"floor": -1}}, 7])
+def test_extents_that_cannot_be_are_refused(tmp_path, extent):
+    run = {"stage": "detection", "extent": extent}
+    with pytest.raises(DataError, match=r"some\.ckpt: expected a model that this version of most can make"):
+        load_trained(save(tmp_path, checkpoint(tiny_predictor()) | {"most_run": run}))
 
 
 @pytest.mark.parametrize("targets", [{"kind": "square"}, {"radius": 2}, 7])

@@ -4,10 +4,12 @@ import importlib
 import itertools
 import re
 import shlex
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import torch
 from hydra import compose, initialize_config_dir
 from hydra.core.override_parser.overrides_parser import OverridesParser
 
@@ -56,6 +58,21 @@ def test_every_target_on_a_page_is_one_of_the_makefile(line):
     known = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
     words = shlex.split(line.split("&&")[0], comments=True)[1:]
     assert [word for word in words if "=" not in word and word not in known] == []
+
+
+def _block(page: Path, opening: str) -> str:
+    """The indented lines from the one that begins with these words up to the next paragraph."""
+    block = page.read_text().split(f"\n    {opening}", 1)[1]
+    lines = itertools.takewhile(lambda line: not line or line.startswith("    "), f"    {opening}{block}".splitlines())
+    return textwrap.dedent("\n".join(lines))
+
+
+def test_the_metrics_count_in_a_loop_of_ones_own(capsys):
+    road, one_car = 40, 1 << 16 | 10
+    true = torch.tensor([one_car] * 60 + [road] * 60)
+    said = torch.tensor([one_car] * 45 + [road] * 75)  # a car's IoU of 3/4, a road's of 4/5
+    exec(_block(ROOT / "README.md", "from most.datasets.taxonomy"), {"scans": [(said, true)] * 2})
+    assert float(capsys.readouterr().out) == pytest.approx((3 / 4 + 4 / 5) / 19)
 
 
 def _anchors(page: Path) -> set[str]:

@@ -18,8 +18,9 @@ from most.heads import CentreHead, OrientedCentreHead, SemanticHead
 from most.inference import Predictor
 from most.membership import Channels, MeanShift, Membership, Nearest, PointSegMLPSettings
 from most.modal.amodal import Amodal
-from most.modal.extent import DropSmall
+from most.modal.extent import DropSmall, TrackMax
 from most.modal.heatmap import HeatmapTargets
+from most.modal.instances import Extent
 from most.network import Network, Trunk
 from most.voxels import Grid
 
@@ -164,12 +165,19 @@ class Trained:
     parts: dict[str, Any] = field(default_factory=dict)  # the components it is made of, as named in ``GROUPS``
     stage1: dict[str, Any] = field(default_factory=dict)  # what ``describe_run`` said of stage 1; empty: not known
     targets: HeatmapTargets | None = None  # how the heat maps that it learned from were drawn; None: not known
+    extent: Extent | None = None  # how large instances were for it; None: not known
 
     def likely_targets(self) -> HeatmapTargets:
         """Return how its heat maps were drawn; the default, with a warning, where the checkpoint does not say."""
         if self.targets is None:
             warnings.warn("the checkpoint does not say how heat maps were drawn: the default is taken", stacklevel=2)
         return self.targets or HeatmapTargets()
+
+    def likely_extent(self) -> Extent:
+        """Return how large instances were for it; track-maximum, with a warning, where the checkpoint does not say."""
+        if self.extent is None:
+            warnings.warn("the checkpoint does not say how large instances were: track_max is taken", stacklevel=2)
+        return self.extent or TrackMax()
 
 
 def load_trained(path: Path) -> Trained:
@@ -200,9 +208,10 @@ def _assemble(description: dict[str, Any], state: dict[str, Any], stage1: dict[s
     for name, module in predictor.modules().items():
         load_weights(module, name, state)
         module.eval()
-    drawn = stage1.get("training", {}).get("targets")
+    drawn, sized = stage1.get("training", {}).get("targets"), stage1.get("extent")
     targets = None if drawn is None else HeatmapTargets(**drawn)
-    return Trained(predictor, taxonomy, description["sweeps"], parts, stage1, targets)
+    extent = None if sized is None else from_plain("extent", sized)
+    return Trained(predictor, taxonomy, description["sweeps"], parts, stage1, targets, extent)
 
 
 def load_weights(module: nn.Module, name: str, state: dict[str, Any]) -> None:

@@ -9,9 +9,11 @@ import pytest
 import torch
 
 from commands import SIMULATE, SPLITS, TRAIN, Signal, most
+from wandb_run import read_run
 
 DATASET = ["dataset=simulated", "dataset.root=streets", *SPLITS]
-QUIET = ["logger=none", "logger.pictures=0"]
+NO_PICTURES = ["logger.pictures=0"]
+QUIET = ["logger=none", *NO_PICTURES]
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +33,8 @@ def succeed(folder: Path, *arguments: str) -> str:
 
 
 def test_amodal_boxes_are_trained_for_predicted_scored_and_drawn(folder: Path) -> None:
-    succeed(folder, "train", *TRAIN, *QUIET, "extent=amodal", "hydra.run.dir=amodal")
+    succeed(folder, "train", *TRAIN, *NO_PICTURES, "extent=amodal", "hydra.run.dir=amodal")
+    check_dashboard(folder)
     model = folder / "amodal/checkpoints/membership-last.ckpt"
     saved = torch.load(model, weights_only=True)
     assert saved["most"]["parts"]["centre_head"]["component"] == "oriented_centre_head"
@@ -51,9 +54,27 @@ def test_amodal_boxes_are_trained_for_predicted_scored_and_drawn(folder: Path) -
         assert scored[name] == (trained[name] and pytest.approx(trained[name], abs=1e-6)), name
     succeed(folder, "draw", "predictions=boxed", "sequence='01'", "index=1", "out=boxed.png", *DATASET)
 
+    ladder = ["oracle", f"checkpoint={model}", "split=val", "dataset.tables=tables", "dataset.workers=0", *DATASET]
+    for name, told in {"own": [], "amodal": ["extent=amodal"], "track_max": ["extent=track_max"]}.items():
+        succeed(folder, *ladder, *told, f"out=as_{name}.json")
+    own, same, tracks = (
+        json.loads((folder / f"as_{name}.json").read_text()) for name in ("own", "amodal", "track_max")
+    )
+    assert own == same
+    assert (own["extent"]["component"], tracks["extent"]["component"]) == ("amodal", "track_max")
+
     other = most(folder, "train", *TRAIN, *QUIET, "stage=membership", f"stage1={model}", "hydra.run.dir=other")
     assert other.returncode == 2
     assert "was trained with another centre_head" in other.stderr
+
+
+def check_dashboard(folder: Path) -> None:
+    """The training told W&B every key that the dashboard shows, those of its pictures aside."""
+    succeed(folder, "dashboard", "out=dashboard.json", "pictures=0")
+    sections, logged = json.loads((folder / "dashboard.json").read_text())["sections"], read_run(folder / "amodal")
+    keys = [key for section in sections for panel in section["panels"] for key in panel["keys"]]
+    assert "train/loss_yaw" in keys
+    assert [key for key in keys if not logged.logged(key)] == []
 
 
 def test_the_oracle_knows_amodal_boxes(folder: Path) -> None:

@@ -57,10 +57,7 @@ def velocity_gain(
         "scans": len(frames),
         "sequences": {name: {way: lstq[way][row] for way in lstq} for row, name in enumerate(names)},
         "lstq": _lstq(lstq["velocity"], lstq["nearest"]),
-        "links": {
-            kind: {name: asdict(sum((each.links[kind] for each in way), Links())) for name, way in ways.items()}
-            for kind in ("all", "moving")
-        },
+        "links": {kind: {name: _links(way, kind) for name, way in ways.items()} for kind in ("all", "moving")},
         "velocity_error": _by_class(VelocityErrors.cat(errors), reader.taxonomy),
     }
 
@@ -119,6 +116,11 @@ def _same_segments(one: Int64[Tensor, "points"], other: Int64[Tensor, "points"])
 def _errors(reader: Reader, frame: Frame, truth: Instances, folder: Path) -> VelocityErrors:
     found = read_assignments(assignments_path(reader.prediction_path(folder, frame)))
     return velocity_errors(found.detections, found.roi, truth)
+
+
+def _links(sequences: Sequence[_Way], kind: str) -> dict[str, int]:
+    """Sum up links over the sequences of a tracking."""
+    return asdict(sum((each.links[kind] for each in sequences), Links()))
 
 
 def _lstq(velocity: list[float], nearest: list[float]) -> dict[str, float]:

@@ -55,16 +55,27 @@ def bev_targets(
     variances = settings.variances(bounds(merged.extents, merged.yaws)[:, :2] / size)
     heatmap = draw_heatmap(planes, cells[:, 1:], variances, (len(instances) * len(thing_ids), *shape))
     chosen = _largest_per_cell((cells[:, 0] * shape[0] + cells[:, 1]) * shape[1] + cells[:, 2], merged.counts)
-    merged = merged.select(chosen)
+    heatmap, offset = heatmap.view(len(instances), len(thing_ids), *shape), position - middle - 0.5
+    return _regressed_at(heatmap, cells[chosen], offset[chosen], merged.select(chosen))
+
+
+def _regressed_at(
+    heatmap: Float[Tensor, "batch things x y"],
+    cells: Int64[Tensor, "centres 3"],
+    offset: Float[Tensor, "centres 2"],
+    instances: Instances,
+) -> BevTargets:
+    """Join a heat map with what is regressed at the cells of these instances' centres."""
+    yaws = instances.yaws
     return BevTargets(
-        heatmap=heatmap.view(len(instances), len(thing_ids), *shape),
-        cells=cells[chosen],
-        offset=(position - middle - 0.5)[chosen],
-        height=merged.centres[:, 2:],
-        extent=merged.extents.log(),
-        velocity=merged.velocities,
-        velocity_known=merged.velocity_known,
-        yaw=None if merged.yaws is None else torch.stack([(2 * merged.yaws).sin(), (2 * merged.yaws).cos()], 1),
+        heatmap,
+        cells,
+        offset,
+        height=instances.centres[:, 2:],
+        extent=instances.extents.log(),
+        velocity=instances.velocities,
+        velocity_known=instances.velocity_known,
+        yaw=None if yaws is None else torch.stack([(2 * yaws).sin(), (2 * yaws).cos()], 1),
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from most.errors import ConfigError
 
 GROUPED_BY = ("choices.extent", "choices.membership", "choices.heads", "backbone.separate")  # of a run's configuration
-PARTS = ("heatmap", "voxel", "point", "offset", "height", "extent", "velocity")  # of stage 1's loss
+PARTS = ("heatmap", "voxel", "point", "offset", "height", "extent", "velocity", "yaw")  # of stage 1's loss; yaw: amodal
 QUALITY = ("pq", "pq_things", "pq_stuff", "sq", "rq", "miou", "pq_present", "miou_present")
 ACCURACY = ("membership_accuracy", "membership_accuracy_contested")
 STAGE2 = "membership/"  # before the keys of stage 2
