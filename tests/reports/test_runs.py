@@ -9,6 +9,7 @@ from example_runs import example_run, example_sums, example_sweep
 from most.errors import DataError
 from most.reports.groups import group
 from most.reports.runs import find_runs
+from most.reports.settings import NO_FIGURE
 
 
 def ways(folder: Path) -> list[tuple[str, str, int, str]]:
@@ -126,6 +127,16 @@ def test_other_sequences_or_settings_are_groups_of_their_own_that_say_what_tells
     assert "backbone.widths=[4, 8]" in first.title
     assert {len(each.rows) for each in others} == {1}
     assert sorted("1 sequence (07)" in each.title for each in others) == [False, True]
+
+
+def test_what_changes_no_figure_for_a_sweep_changes_none_for_a_report(tmp_path: Path) -> None:
+    for number in (1, 2):
+        settings = {"name": f"try{number}", "trainer": {"threads": number}, "logger": {"kind": "none", "mode": number}}
+        example_run(tmp_path / str(number), example_sums(0.7, number), seed=number, **settings)
+    (found,) = group(find_runs(tmp_path).scored)
+    assert found.title.startswith("sim_demo on simulated")
+    assert sorted(found.by_seed(found.strategies[0])) == [1, 2]
+    assert {"name", "logger", "trainer.threads"} <= {*NO_FIGURE}
 
 
 def test_two_runs_of_one_strategy_and_seed_are_refused(tmp_path: Path) -> None:
