@@ -33,8 +33,9 @@ class Group:
         seeds = self.rows.setdefault(scored.strategy, {}).setdefault(scored.source, {})
         other = seeds.setdefault(scored.seed, scored)
         if other is not scored and scored.source != BESIDE:
+            unused = "" if scored.strategy.has_centres else f" ({scored.strategy.heads} uses no extent)"
             raise DataError(
-                f"{scored.folder}: expected one run of {scored.strategy.detection}, membership "
+                f"{scored.folder}: expected one run of {scored.strategy.detection}{unused}, membership "
                 f"{scored.strategy.membership}, seed {scored.seed}, found another in {other.folder}; keep one in runs"
             )
 
