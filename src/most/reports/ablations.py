@@ -32,11 +32,11 @@ class Ablation:
     columns: dict[str, str]
     notes: tuple[str, ...]
     first: str  # what differences are against unless another is chosen
-    beside: bool  # nearest centres are those of the runs that trained stage 2
+    beside: bool  # rows are memberships, and nearest centres those of the runs that trained stage 2
 
     def title_of(self, strategy: Strategy) -> str:
         """A row's title."""
-        return strategy.title if self.name == "table1" else strategy.membership_title
+        return strategy.membership_title if self.beside else strategy.title
 
     def runs(self, group: Group, strategy: Strategy) -> BySeed:
         """A row's runs."""

@@ -67,5 +67,5 @@ def between(cell: Interval | None, signed: bool = False) -> str:
 def seeds(row: Row) -> str:
     """Seeds in words, and on how few trainings of stage 1 they stand."""
     few = len(row.parts)
-    on = f" on {few} stage{'s' if few > 1 else ''} 1" if few < len(row.seeds) else ""
+    on = f" on {'one stage' if few == 1 else f'{few} stages'} 1" if few < len(row.seeds) else ""
     return ", ".join(map(str, row.seeds)) + on

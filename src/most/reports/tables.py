@@ -59,7 +59,7 @@ def occlusion_tables(ablation: Ablation, analysis: Analysis, baseline: str | Non
     objects = known[0][:, [SEGMENTS.index("tp"), SEGMENTS.index("fn")]].sum((0, 1))
     shown = ", ".join(f"{count:g} of {label}" for label, count in zip(bins.labels, objects, strict=True))
     notes = (bins.meaning, f"Objects in all scans: {shown}.")
-    parted = replace(ablation, name="occlusion", title=bins.title, columns=bins.columns)
+    parted = replace(ablation, name="occlusion", title=f"{bins.title}, by the {bins.axis}", columns=bins.columns)
     whole = _table(analysis, parted.name, parted.title, rows, parted.columns, notes, paper=None)
     apart = difference_table(parted, analysis, baseline)
     return [whole, *([] if apart is None else [apart])]
