@@ -187,7 +187,7 @@ def test_predictions_that_do_not_say_how_they_were_made_are_named(tmp_path: Path
 def test_orders_are_said_with_their_confidence(analysis: Analysis) -> None:
     parts = {"table1": amodalization(analysis.group), "table2": memberships(analysis.group)}
     table = order_table(parts, analysis)
-    assert table.words["MAX above SW"] == "shown (in 100.0 % of draws)"
+    assert table.words["MAX above SW"] == "shown (100.0 % of draws agree)"
     assert re.match(r"Does the paper's order show\? Of 10: \d+ shown, \d+ reversed, \d+ open", table.title)
     rows = {row.title: row.cells for row in table.blocks[0].rows}
     assert rows["MAX above SW"]["paper: PQ"].value == pytest.approx(0.033)

@@ -160,11 +160,17 @@ def test_stage_1_is_told_by_where_it_was_trained(tmp_path: Path) -> None:
     """Of itself, or of another's folder or checkpoint, from wherever that was named; copies keep what was."""
     sums, beside = example_sums(0.7, 1), example_sums(0.6, 1)
     example_run(tmp_path / "one", sums)
-    places = ("one", "./one/checkpoints/detection-best.ckpt", "/trained/one", "/elsewhere/weights.ckpt")
+    best = "./one/checkpoints/detection-best.ckpt"
+    places = ("one", best, "/trained/one", "/elsewhere/weights.ckpt", "seed-${seed}", "${nothing}")
     for number, place in enumerate(places):
         example_run(tmp_path / f"{number}", sums, seed=number, nearest=beside, stage1=place)
     found = {each.folder.name: each.stage1 for each in find_runs(tmp_path).scored}
-    assert found == {**dict.fromkeys(("one", "0", "1", "2"), "/trained/one"), "3": "/elsewhere/weights.ckpt"}
+    assert found == {
+        **dict.fromkeys(("one", "0", "1", "2"), "/trained/one"),
+        "3": "/elsewhere/weights.ckpt",
+        "4": "/trained/seed-4",
+        "5": "/trained/${nothing}",
+    }
 
 
 def test_what_changes_no_figure_for_a_sweep_changes_none_for_a_report(tmp_path: Path) -> None:

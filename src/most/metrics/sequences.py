@@ -42,10 +42,10 @@ class SequenceScores:
     def sums(self) -> dict[str, dict[str, list[Any]]]:
         """Return of each sequence what S_assoc is summed of, on nuScenes also PTQ and PAT, as ``sums`` has it."""
         size, found = self.taxonomy.num_classes, self.lstq.by_sequence()
-        none = {"assoc": [0.0] * size, "tubes": [0] * size}
+        none: dict[str, list[Any]] = {"assoc": [0.0] * size, "tubes": [0] * size}
         tubes = {number: {"assoc": each.sums.tolist(), "tubes": each.tubes.tolist()} for number, each in found.items()}
         tracks = {} if self.tracking is None else self.tracking.by_sequence()
-        untracked = {} if self.tracking is None else {"switches": [0] * size, "tq": [0.0, 0]}
+        untracked: dict[str, list[Any]] = {} if self.tracking is None else {"switches": [0] * size, "tq": [0.0, 0]}
         return {name: tubes.get(number, none) | tracks.get(number, untracked) for name, number in self.numbers.items()}
 
     def report(self) -> dict[str, Any]:

@@ -63,7 +63,8 @@ def track_qualities(statistics: TrackingStatistics) -> TrackQualities:
         association = np.bincount(track_of, scans**2 / (length[track_of] + elsewhere), len(tracks)) / length
         return np.sqrt(association * steady)
 
-    return TrackQualities(*tracks[:, :2].T, quality(np.where(enough > 0, enough - scans, 0)), quality(counted - scans))
+    official, repaired = quality(np.where(enough > 0, enough - scans, 0)), quality(counted - scans)
+    return TrackQualities(tracks[:, 0], tracks[:, 1], official, repaired)
 
 
 def class_tracking(statistics: TrackingStatistics) -> ClassTracking:

@@ -50,7 +50,7 @@ COLUMNS = {"PQ": "pq", "PQ Th": "pq_things"}
 PAPERS = {f"paper: {column}": column for column in COLUMNS}
 NOTE = (
     "Differences, percent points. The order of PQ shows where the interval lies above 0, is reversed where it lies "
-    "below, and is open in between; beside it, in how many of all draws the first has the higher PQ. Extents are made "
+    "below, and is open in between; beside it, how many of all draws agree with the paper. Extents are made "
     "for things (PQ Th). Behind ours are the paper's own, on Panoptic nuScenes, validation."
 )
 
@@ -71,7 +71,8 @@ def order_table(ablations: Mapping[str, Ablation], analysis: Analysis) -> Table 
         return None
     block = Block(measured_here(analysis), tuple(rows), ours=True)
     shown = ", ".join(f"{sum(text.startswith(word) for text in said.values())} {word}" for word in WORDS)
-    title = f"Does the paper's order show? Of {len(rows)}: {shown}"
+    alone = ", by one training a row" if all(len(row.parts) == 1 for row in rows) else ""
+    title = f"Does the paper's order show? Of {len(rows)}: {shown}{alone}"
     return Table(
         "orders", title, (*COLUMNS, *PAPERS), (block,), (NOTE,), signed=True, words=said, papers=frozenset(PAPERS)
     )
@@ -92,4 +93,4 @@ def verdict(difference: Interval | None) -> str:
     if difference.low is None or difference.high is None or difference.above is None:
         return "no interval: one training, one sequence"
     said = WORDS[0 if difference.low > 0 else 1 if difference.high < 0 else 2]
-    return f"{said} (in {100 * difference.above:.1f} % of draws)"
+    return f"{said} ({100 * difference.above:.1f} % of draws agree)"

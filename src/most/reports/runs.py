@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from omegaconf import OmegaConf
+from omegaconf.errors import OmegaConfBaseException
 
 from most.errors import DataError
 from most.metrics.report import read_report
@@ -128,8 +130,16 @@ def _stage1(config: Mapping[str, Any], runtime: Mapping[str, Any], folder: Path)
     """Return where stage 1 was trained, as it was called then: it, and folders that stand on it, may be moved."""
     if config.get("stage1") is None:
         return str(runtime.get("output_dir", folder))
-    path = Path(os.path.normpath(Path(runtime.get("cwd", "")) / config["stage1"]))
+    path = Path(os.path.normpath(Path(runtime.get("cwd", "")) / _resolved(config, "stage1")))
     return str(path.parents[1] if path.suffix == ".ckpt" and path.parent.name == "checkpoints" else path)
+
+
+def _resolved(config: Mapping[str, Any], key: str) -> str:
+    """Return a setting with what it refers to, as ``${seed}``; what cannot be found out stays as it was told."""
+    try:
+        return str(OmegaConf.create(dict(config))[key])
+    except OmegaConfBaseException:
+        return str(config[key])
 
 
 def _unfinished(folder: Path, config: Mapping[str, Any]) -> str:

@@ -18,8 +18,8 @@ from most.reports.tables import ablation_table, benchmark_tables, difference_tab
 
 METHOD = (
     "Means over seeds in percent; below them what 95 % of all draws lie between, of seeds first and held-out sequences "
-    "then, the same draws for all rows. Italic rows on tinted ground are the paper's, on other data: they are there to "
-    "compare orders, not figures."
+    "then, the same draws for all rows. What is said to be the paper's (italic, on tinted ground) was measured on "
+    "other data: it is there to compare orders, not figures."
 )
 
 
