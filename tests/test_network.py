@@ -64,6 +64,28 @@ def test_windows_of_a_batch_do_not_see_each_other(settings):
         assert torch.allclose(value, torch.cat([getattr(each.maps, name) for each in alone]), atol=1e-5), name
 
 
+@pytest.mark.parametrize("heads", [{}, {"centre_head": OffsetHead(channels=8), "membership": MeanShift()}])
+@pytest.mark.parametrize("settings", BACKBONES)
+def test_gradients_are_the_same_every_time_on_several_threads(settings, heads):
+    made = network(settings, **heads).train()
+    samples = [window(cloud(40_000), cloud(20_000, 1))]
+
+    def gradients() -> list[torch.Tensor]:
+        output = made(samples)
+        found = output.offsets if output.maps is None else output.maps.offset
+        total = (output.point_logits.square().sum(1) * torch.linspace(0, 1, 40_000)).sum() + found.square().sum()
+        return list(torch.autograd.grad(total, list(made.parameters()), allow_unused=True))
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        first = gradients()
+        for _ in range(3):
+            assert all(a is b is None or torch.equal(a, b) for a, b in zip(first, gradients(), strict=True))
+    finally:
+        torch.set_num_threads(before)
+
+
 def test_permuted_points_have_permuted_logits():
     model, here, past = network(), cloud(80), cloud(40, 1)
     order = torch.randperm(80, generator=torch.Generator().manual_seed(0))

@@ -99,7 +99,7 @@ class Network(Trunk):
         if isinstance(self.centre_head, CentreMaps):
             return self.centre_head(seen.bev), None
         votes = self.grid.middles(voxels.coordinates[:, 1:]) + self.centre_head(seen.voxels).float()
-        return None, votes[voxels.point_voxel[current]] - points[current, :3]
+        return None, votes.index_select(0, voxels.point_voxel[current]) - points[current, :3]
 
     def voxel_cells(self, voxels: Voxels) -> Int64[Tensor, "voxels"]:
         """Return the BEV cell of each voxel, counted over (batch, x, y)."""

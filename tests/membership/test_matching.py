@@ -29,8 +29,8 @@ def test_points_of_the_matched_instance_are_members_and_others_are_not() -> None
     assert targets((0, 0), (1, 0), (2, 0)) == [1.0, 0.0, 0.0]
 
 
-def test_a_detection_that_stands_for_nothing_has_no_members() -> None:
-    assert targets((0, 1), (1, 1), (2, 1)) == [0.0, 0.0, 0.0]
+def test_a_detection_that_stands_for_nothing_teaches_nothing() -> None:
+    assert targets((0, 1), (1, 1), (2, 1)) == [None, None, None]
 
 
 def test_void_and_points_of_the_class_without_an_instance_are_unknown() -> None:

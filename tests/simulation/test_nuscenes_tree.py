@@ -216,6 +216,11 @@ def test_damaged_records_are_refused_by_name(short: Path, damage: Callable[[str]
     [
         ({"layout": "waymo"}, r"simulation\.layout: expected one of semantickitti, nuscenes, found 'waymo'"),
         ({"layout": "nuscenes"}, r"simulation\.sequences: expected names such as scene-0061 in the layout nuscenes"),
+        (
+            {"layout": "nuscenes", "sequences": [VAL], "every": 2},
+            r"simulation\.every: expected 1 in the layout nuscenes",
+        ),
+        ({"every": 0}, r"simulation\.every: expected a number in \[1, 100\], found 0"),
         ({"sequences": [VAL]}, r"simulation\.sequences: expected names of two digits.* in the layout semantickitti"),
     ],
 )

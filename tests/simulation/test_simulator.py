@@ -54,6 +54,21 @@ def test_files_of_a_scan_fit_together(tree):
     assert [float(line) for line in (folder / "times.txt").read_text().split()] == [0.0, 0.1]
 
 
+def test_of_several_revolutions_one_can_be_written(tree, tmp_path):
+    told = _settings()
+    told.every = 10
+    simulate(told, tmp_path)
+
+    def drive(root: Path) -> tuple[float, float]:
+        folder = root / "sequences" / "00"
+        poses = np.loadtxt(folder / "poses.txt").reshape(2, 3, 4)
+        return float(np.loadtxt(folder / "times.txt")[1]), float(np.linalg.norm(poses[1, :, 3] - poses[0, :, 3]))
+
+    (time, way), (longer_time, longer_way) = drive(tree), drive(tmp_path)
+    assert (time, longer_time) == pytest.approx((0.1, 1.0))
+    assert longer_way == pytest.approx(10 * way, rel=0.01)
+
+
 def test_boxes_load_without_pickle_and_count_the_points(tree):
     folder = tree / "sequences" / "00"
     with np.load(folder / "boxes.npz", allow_pickle=False) as file:

@@ -44,7 +44,7 @@ class BevBranch(nn.Module):
             return x, bev
         batch, cell_x, cell_y = columns.unbind(1)
         found = self.back(bev.permute(0, 2, 3, 1)[batch, cell_x, cell_y])
-        return x.with_features(x.features + found[column]), bev
+        return x.with_features(x.features + found.index_select(0, column)), bev
 
     def _stack(self, x: SparseTensor, columns: int, column: Int64[Tensor, "voxels"]) -> Float[Tensor, "columns stack"]:
         """Set the voxels of a column side by side, lowest first; empty ones are zero."""

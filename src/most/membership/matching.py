@@ -41,11 +41,12 @@ def pair_targets(
     """Return Y_mem of each pair, 1 for members and 0 for others (paper, Eq. 3), and whether it is known.
 
     ``semantics`` and ``labels`` are the truth's, ``matches`` those of :func:`match_detections`. A detection that stands
-    for no instance has no members. Void points are unknown, and so are points of the detection's class without an
-    instance: they could be its own.
+    for no instance has no members, but those pairs are unknown: what learns from them learns to doubt centres, and
+    leaves the points of true ones to nobody. Void points are unknown, and so are points of the detection's class
+    without an instance: they could be its own.
     """
     keys = torch.cat([truth.keys, truth.keys.new_tensor([-1])])[matches]  # no label is negative
     owned = torch.isin(labels, truth.keys)[pairs.points]
     seen, label = semantics[pairs.points], labels[pairs.points]
-    known = (seen != 0) & (owned | (seen != classes[pairs.detections]))
+    known = (seen != 0) & (owned | (seen != classes[pairs.detections])) & (matches >= 0)[pairs.detections]
     return (label == keys[pairs.detections]).float(), known

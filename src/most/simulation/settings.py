@@ -84,6 +84,7 @@ class SimulationSettings:
     speed: float = 8.0  # of the sensor, m/s; each sequence drives at 0.6 to 1.4 times that
     sensor: SensorSettings = field(default_factory=SensorSettings)
     traffic: TrafficSettings = field(default_factory=TrafficSettings)
+    every: int = 1  # so many revolutions of the sensor for a scan: 10 shows an instance from many sides in few scans
     layout: str = "semantickitti"  # or nuscenes; it sets the time between scans, too
 
     def __post_init__(self) -> None:
@@ -94,10 +95,13 @@ class SimulationSettings:
         unique = len(set(self.sequences)) == len(self.sequences) > 0
         _expect("sequences", unique, "each name once, at least one", self.sequences)
         _expect("scans", 1 <= self.scans <= 10_000, "a number in [1, 10000]", self.scans)
+        _expect("every", 1 <= self.every <= 100, "a number in [1, 100]", self.every)
+        keyed = self.layout == "nuscenes"  # its key frames are so many sweeps apart
+        _expect("every", not keyed or self.every == 1, "1 in the layout nuscenes", self.every)
         _expect("seed", self.seed >= 0, "0 or more", self.seed)
         _expect("speed", 0 <= self.speed <= 40, "m/s in [0, 40]", self.speed)
 
     @property
     def period(self) -> float:
         """Time between scans, s."""
-        return LAYOUTS[self.layout].period
+        return LAYOUTS[self.layout].period * self.every
