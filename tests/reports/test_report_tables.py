@@ -17,7 +17,7 @@ from most.reports.ablations import AMODALIZATION, SMALL, amodalization, membersh
 from most.reports.analysis import Analysis
 from most.reports.formats import latex, markdown
 from most.reports.groups import group
-from most.reports.notes import ALONE, SHARED, UNTOLD, remarks
+from most.reports.notes import ALONE, SHARED, UNSEEN, UNTOLD, remarks
 from most.reports.orders import order_table, verdict
 from most.reports.plots import plots
 from most.reports.runs import Scored, find_runs
@@ -164,6 +164,8 @@ def test_occlusion_is_a_table_with_differences_where_runs_know_it(analysis: Anal
     (found,) = group(find_runs(tmp_path).scored)  # of both versions
     (partly,) = occlusion_tables(amodalization(found), Analysis(found, 200, 1), None)
     assert ours(partly) == {"Modal Det. (MAX)": {}}
+    assert UNSEEN in partly.notes
+    assert UNSEEN not in whole.notes
     example_run(tmp_path / "old", old)
     (found,) = group(find_runs(tmp_path / "old").scored)
     assert occlusion_tables(amodalization(found), Analysis(found, 200, 1), None) == []

@@ -15,10 +15,17 @@ UNTOLD = (
     "not every report says with which settings of membership and tracker it was predicted (those of most.track, of "
     "others' predictions and of earlier versions do not); they are taken for the defaults."
 )
+UNSEEN = "A row without figures has runs of an earlier version, which did not count by occlusion."
 UNSUMMED = (
     "PAT and PTQ without an interval: their report is of an earlier version, which kept no sums of them by sequence; "
     "score the predictions again with most.evaluate."
 )
+
+
+def unseen(rows: Mapping[str, BySeed]) -> Iterator[str]:
+    """Say why rows have no figures by occlusion."""
+    if any(run.sums.visible is None for runs in rows.values() for run in runs.values()):
+        yield UNSEEN
 
 
 def remarks(group: Group) -> Iterator[str]:

@@ -7,7 +7,7 @@ from most.metrics.paper_tables import MEANS, SEGMENTATION, TRACKING, class_order
 from most.reports.ablations import Ablation
 from most.reports.analysis import Analysis
 from most.reports.bins import by_visible
-from most.reports.notes import predictions, trackers, unsummed
+from most.reports.notes import predictions, trackers, unseen, unsummed
 from most.reports.paper import paper_block
 from most.reports.sums import SEGMENTS
 from most.reports.table import Block, Row, Table
@@ -58,7 +58,7 @@ def occlusion_tables(ablation: Ablation, analysis: Analysis, baseline: str | Non
         return []
     objects = known[0][:, [SEGMENTS.index("tp"), SEGMENTS.index("fn")]].sum((0, 1))
     shown = ", ".join(f"{count:g} of {label}" for label, count in zip(bins.labels, objects, strict=True))
-    notes = (bins.meaning, f"Objects in all scans: {shown}.")
+    notes = (bins.meaning, f"Objects in all scans: {shown}.", *unseen(rows))
     parted = replace(ablation, name="occlusion", title=f"{bins.title}, by the {bins.axis}", columns=bins.columns)
     whole = _table(analysis, parted.name, parted.title, rows, parted.columns, notes, paper=None)
     apart = difference_table(parted, analysis, baseline)
