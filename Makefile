@@ -42,7 +42,7 @@ demo: setup
 	$(RUN) -m most.predict checkpoint=$(MODEL) split=test out=$(DEMO)/full $(STREETS)
 	$(RUN) -m most.evaluate predictions=$(DEMO)/nearest split=test out=$(DEMO)/nearest.json $(STREETS)
 	$(RUN) -m most.evaluate predictions=$(DEMO)/full split=test out=$(DEMO)/metrics.json $(STREETS)
-	$(RUN) -m most.draw predictions=$(DEMO)/full sequence="'10'" index=5 out=$(DEMO)/sweep.png $(STREETS)
+	$(RUN) -m most.draw predictions=$(DEMO)/full sequence="'20'" index=5 out=$(DEMO)/sweep.png $(STREETS)
 	$(RUN) -m most.compare 'reports={nearest: $(DEMO)/nearest.json, full: $(DEMO)/metrics.json}'
 	@echo "tables: above, in $(DEMO)/metrics.json and $(DEMO)/nearest.json; picture: $(DEMO)/sweep.png"
 

@@ -9,6 +9,7 @@ import yaml
 
 from most.datasets.taxonomy import Taxonomy
 from most.metrics.segment_sums import DISTANCES, POINTS
+from most.metrics.sightings import VISIBLE
 
 TAXONOMY = Taxonomy.load("semantickitti")
 CLASSES = (1, 2, 6, 9, 13)  # that the sequences have: three things and two of stuff
@@ -27,6 +28,7 @@ def example_sums(
         "min_points": TAXONOMY.min_points,
         "distance_edges": list(DISTANCES),
         "points_edges": list(POINTS),
+        "visible_edges": list(VISIBLE),
         "sequences": {name: _sequence(quality, luck, membership, tracked) for name in sequences},
     }
 
@@ -34,8 +36,9 @@ def example_sums(
 def _sequence(quality: float, luck: np.random.Generator, membership: float, tracked: bool) -> dict[str, Any]:
     size = TAXONOMY.num_classes
     is_there = np.isin(np.arange(size), CLASSES)
-    binned = {key: _segments(quality, luck, is_there & np.isin(np.arange(size), TAXONOMY.things), bins)
-              for key, bins in (("distance", len(DISTANCES)), ("points", len(POINTS)))}  # fmt: skip
+    things = is_there & np.isin(np.arange(size), TAXONOMY.things)
+    edges = {"distance": DISTANCES, "points": POINTS, "visible": VISIBLE}
+    binned = {key: _segments(quality, luck, things, len(bins)) for key, bins in edges.items()}
     true = 1000 * is_there
     hits = luck.binomial(true, quality)
     found = {name: rows[0] for name, rows in _segments(quality, luck, is_there, 1).items()}
@@ -60,6 +63,7 @@ def example_run(
     *,
     seed: int = 1,
     extent: str = "track_max",
+    heads: str = "modal_centres",
     membership: str = "full",
     nearest: dict[str, Any] | None = None,
     overrides: tuple[str, ...] = (),
@@ -76,8 +80,10 @@ def example_run(
         "membership": {"widths": [4]},
         "stage": {"run": stages},
     } | config
-    choices = {"extent": extent, "membership": membership, "dataset": "simulated", "experiment": "sim_demo"}
-    hydra = {"hydra": {"runtime": {"choices": choices}}}
+    choices = {"extent": extent, "heads": heads, "membership": membership}
+    choices |= {"dataset": "simulated", "experiment": "sim_demo"}
+    runtime = {"choices": choices, "cwd": "/trained", "output_dir": f"/trained/{folder.name}"}
+    hydra = {"hydra": {"runtime": runtime}}
     for name, content in {"config": settings, "hydra": hydra, "overrides": list(overrides)}.items():
         path = folder / ".hydra" / f"{name}.yaml"
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -9,11 +9,12 @@ from most.datasets.semantickitti import SemanticKITTI, Splits
 from most.datasets.window_stream import WindowStream
 from most.errors import DataError
 from most.inference import Prediction
-from most.membership import Nearest
+from most.membership import Clustering, Nearest
 from most.predicting import (
     claim_folder,
     describe_model,
     describe_split,
+    predicted_by,
     unfinished,
     write_predictions,
 )
@@ -171,6 +172,27 @@ def test_what_a_killed_writer_left_is_no_other_content(tmp_path, checkpoint, rea
     (out / ".prediction.json.x1y2.part").write_text("{")
     claim(out, checkpoint, reader, "val")
     assert "prediction.json" in files(out)
+
+
+def test_a_folder_tells_what_is_no_default_of_how_it_was_predicted(tmp_path, checkpoint, reader):
+    tracker = TrackerSettings(motion="kalman")
+    for name, membership in {"trained": None, "nearest": Nearest(), "wide": Clustering(margin=2.0)}.items():
+        described = describe_model(checkpoint, membership, tracker if name == "wide" else TrackerSettings())
+        claim_folder(tmp_path / name, described, describe_split(reader, "val"))
+    said = {name: predicted_by(tmp_path / name)["prediction"] for name in ("trained", "nearest", "wide")}
+    assert {name: (each["membership"], each["changed"]) for name, each in said.items()} == {
+        "trained": ("trained", []),
+        "nearest": ("nearest", []),
+        "wide": ("clustering", ["membership.margin=2.0", "tracker.motion=kalman"]),
+    }
+    assert len({each["checkpoint_sha256"] for each in said.values()}) == 1
+
+
+@pytest.mark.parametrize("content", [None, "", "[]", "{}", '{"membership": 3, "tracker": {}}'])
+def test_a_folder_that_does_not_tell_says_nothing(tmp_path, content):
+    if content is not None:
+        (tmp_path / "prediction.json").write_text(content)
+    assert predicted_by(tmp_path) == {}
 
 
 def test_a_file_in_the_folders_place_is_refused(checkpoint, reader):

@@ -12,6 +12,7 @@ from most.entry import run, start
 from most.metrics.folders import evaluate_folder
 from most.metrics.paper_tables import paper_rows, why_none
 from most.metrics.report import format_row, format_table, write_report
+from most.predicting import predicted_by
 
 
 @dataclass
@@ -32,7 +33,8 @@ def evaluate(config: EvaluateConfig) -> None:
     """Write the report to ``out`` and print its tables; labels are needed of the dataset, scans are not."""
     reader = config.dataset.reader()
     frames = reader.labelled_frames(config.split)
-    report = evaluate_folder(reader, frames, Path(config.predictions))
+    predictions = Path(config.predictions)
+    report = evaluate_folder(reader, frames, predictions) | predicted_by(predictions)
     write_report(Path(config.out), report)
     taxonomy = reader.taxonomy
     print(format_table(report["panoptic"], [taxonomy.class_names[thing] for thing in taxonomy.things]))

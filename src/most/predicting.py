@@ -1,6 +1,7 @@
 """Writing the predictions of a dataset's split: the official label files, and the detections beside them."""
 
 import hashlib
+import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from functools import partial
@@ -12,7 +13,7 @@ from tqdm import tqdm
 
 from most.assembly import check_taxonomy
 from most.claims import claim
-from most.config import to_plain
+from most.config import COMPONENTS, to_plain
 from most.datasets.reader import Frame, Reader
 from most.datasets.window_stream import WindowStream
 from most.datasets.windows import Window
@@ -51,6 +52,28 @@ def describe_model(checkpoint: Path, membership: Any, tracker: TrackerSettings) 
         "membership": "trained" if membership is None else to_plain("membership", membership),
         "tracker": asdict(tracker),
     }
+
+
+def predicted_by(folder: Path) -> dict[str, Any]:
+    """Return what a report on a folder of predictions says of their making; nothing where they do not tell.
+
+    ``{"prediction": {checkpoint_sha256, membership, changed}}``: the membership's name, or "trained", and the settings
+    of it and of the tracker that are not the defaults, as ``tracker.motion=kalman``.
+    """
+    try:
+        record = json.loads((folder / RECORD).read_text())
+        membership, tracker = record["membership"], _changed("tracker", "tracker", record["tracker"])
+        name = membership if membership == "trained" else membership["component"]
+        own = [] if membership == "trained" else _changed("membership", name, membership["settings"])
+        made = {"checkpoint_sha256": record["checkpoint_sha256"], "membership": name, "changed": own + tracker}
+    except (OSError, ValueError, LookupError, TypeError):
+        return {}  # others' predictions, or of an earlier version
+    return {"prediction": made}
+
+
+def _changed(group: str, name: str, settings: Mapping[str, Any]) -> list[str]:
+    usual = asdict(COMPONENTS[group][name]())
+    return [f"{group}.{key}={value}" for key, value in settings.items() if usual.get(key) != value]
 
 
 def describe_split(reader: Reader, split: str) -> dict[str, Any]:

@@ -22,14 +22,11 @@ from most.config import Config, typed
 from most.datasets.reader import Reader
 from most.entry import end
 from most.errors import ConfigError, DataError, FailedError, MostError, StoppedError
+from most.reports.settings import NO_FIGURE, is_of
 from most.stages.settings import STAGES
 from most.training import METRICS, checkpoint_path
 
 LONGEST = 120  # characters of a folder's name
-NO_FIGURE = (  # settings that change how a run is done, not what it is
-    "logger", "paths", "resume", "name", "dataset.tables", "dataset.workers", "dataset.cache",
-    "trainer.threads", "trainer.progress_bar", "trainer.log_every", "trainer.save_every",
-)  # fmt: skip
 ELSEWHERE = ("experiment", "dataset.root")  # they stand in the sweep's folder, or are too long for a name
 
 log = logging.getLogger(__name__)
@@ -68,7 +65,7 @@ def job_name(overrides: Sequence[str]) -> str:
     Choices come first: a long name ends in a digest.
     """
     told = [override.lstrip("+") for override in overrides]
-    kept = [override for override in told if not _is_of(override.split("=")[0], (*NO_FIGURE, *ELSEWHERE))]
+    kept = [override for override in told if not is_of(override.split("=")[0], (*NO_FIGURE, *ELSEWHERE))]
     kept.sort(key=lambda override: ("." in override or "/" in override, override))
     name = re.sub(r"[^\w.+-]", "_", "+".join(kept).replace("=", "-")) or "default"
     if len(name) <= LONGEST:
@@ -119,7 +116,7 @@ def _check_beginning(job: Job) -> None:
     began = _written(written)
     now = flat(_plain(job.settings())) | chosen(job.composed.hydra.runtime.choices)
     for key in began.keys() & now.keys():
-        if began[key] != now[key] and not _is_of(key, NO_FIGURE):
+        if began[key] != now[key] and not is_of(key, NO_FIGURE):
             raise ConfigError(
                 f"{job.folder} began with {key} = {began[key]}, found {now[key]}; "
                 "repeat the settings it began with, or choose another hydra.sweep.dir"
@@ -206,10 +203,6 @@ def _first(error: BaseException) -> BaseException:
     while error.__context__ is not None and not error.__suppress_context__:
         error = error.__context__
     return error
-
-
-def _is_of(key: str, groups: Sequence[str]) -> bool:
-    return any(key == group or key.startswith(f"{group}.") for group in groups)
 
 
 def _plain(config: Any) -> dict[str, Any]:

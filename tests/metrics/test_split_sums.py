@@ -86,7 +86,7 @@ def test_what_one_scan_does_not_know_the_sequence_does_not_know() -> None:
     sums.update("08", (torch.tensor([CAR]), labels), (torch.tensor([CAR]), labels))
     of = sums.plain()["sequences"]["08"]
     assert of["scans"] == 2
-    assert of["distance"] is of["membership"] is None
+    assert of["distance"] is of["visible"] is of["membership"] is None
 
 
 def test_a_list_of_numbers_takes_one_line_and_reads_back(tmp_path: Path) -> None:
@@ -94,4 +94,4 @@ def test_a_list_of_numbers_takes_one_line_and_reads_back(tmp_path: Path) -> None
     write_report(tmp_path / "metrics.json", {"sums": section})
     text = (tmp_path / "metrics.json").read_text()
     assert json.loads(text)["sums"] == section
-    assert len(text.splitlines()) < 120
+    assert len(text.splitlines()) < 150

@@ -42,7 +42,7 @@ def test_each_sequence_once_gives_the_figures_of_the_metrics(scores: LabelScores
     for name, row in official["per_class"].items():
         assert found.get(f"pq/{name}", [0.0])[0] == pytest.approx(row["pq"], rel=1e-12)
     tracking = report.get("lstq") or report["tracking"]
-    for name in ("lstq", "s_assoc", "s_cls"):
+    for name in ("lstq", "s_assoc", "s_cls", *(("ptq", "tq", "pat") if "tracking" in report else ())):
         assert found[name][0] == pytest.approx(tracking[name], rel=1e-9), name
     assert found["membership_accuracy"][0] == 0.75
     assert found["membership_accuracy_contested"][0] == 0.5

@@ -33,8 +33,8 @@ def test_in_a_browser_tables_and_plots_are_there_and_nothing_is_wrong(page: Path
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "CONSOLE" not in done.stderr
-    assert done.stdout.count("<caption>") == 8  # orders, two tables with differences, IV, classes, left out
-    assert done.stdout.count('<svg role="img"') == 4
+    assert done.stdout.count("<caption>") == 10  # orders, three tables with differences, IV, classes, left out
+    assert done.stdout.count('<svg role="img"') == 5
     assert "a&lt;b&amp;c" in done.stdout
 
 
@@ -67,7 +67,7 @@ def test_the_page_is_well_formed_stands_alone_and_has_a_name_for_everything(page
     assert not re.search(r'(src|href)="(?!#|data:)', text)
     assert "<script" not in text
     assert text.count("<caption>") == text.count("<table>")
-    assert text.count("<svg ") == text.count('<svg role="img" aria-label="') == text.count("<figcaption>") == 4
+    assert text.count("<svg ") == text.count('<svg role="img" aria-label="') == text.count("<figcaption>") == 5
     assert "#010203" not in text  # the plots' ink is the page's
     assert text.count("currentColor") > 20
     assert "prefers-color-scheme: dark" in text

@@ -1,7 +1,9 @@
 """The paper's tables: its rows and columns, ours and its figures apart, differences by hand, and their files."""
 
 import csv
+import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,15 +13,17 @@ from example_runs import example_run, example_sums, example_sweep
 from most.errors import ConfigError
 from most.metrics.paper_tables import SEGMENTATION, TRACKING
 from most.reports import paper
-from most.reports.ablations import AMODALIZATION, amodalization, memberships
+from most.reports.ablations import AMODALIZATION, SMALL, amodalization, memberships
 from most.reports.analysis import Analysis
 from most.reports.formats import latex, markdown
 from most.reports.groups import group
+from most.reports.notes import ALONE, SHARED, UNSEEN, UNTOLD, remarks
 from most.reports.orders import order_table, verdict
 from most.reports.plots import plots
-from most.reports.runs import find_runs
-from most.reports.table import Table
-from most.reports.tables import ablation_table, benchmark_tables, difference_table
+from most.reports.runs import Scored, find_runs
+from most.reports.table import Table, seeds
+from most.reports.tables import ablation_table, benchmark_tables, difference_table, occlusion_tables
+from most.reports.units import units
 from most.reports.write import write_reports
 
 
@@ -47,6 +51,7 @@ def test_table_1_has_the_papers_rows_in_its_order(analysis: Analysis) -> None:
     figures = next(row for block, row in table.rows() if not block.ours and row.title == "Modal Det. (MAX)")
     assert figures.cells["PQ"].value == pytest.approx(0.771)
     assert "(full)" in table.notes[0]
+    assert SMALL in table.notes
 
 
 def test_table_2_compares_with_the_nearest_centre_of_the_same_stage_1(analysis: Analysis) -> None:
@@ -80,6 +85,21 @@ def test_a_single_row_has_no_differences_and_one_run_no_interval(tmp_path: Path)
     assert row.cells["PQ"].low is None
 
 
+def test_a_figure_that_neither_row_has_is_no_difference(tmp_path: Path) -> None:
+    """No sequence has a thing in view in the first bin."""
+    for seed, extent in enumerate(("shrink_wrap", "track_max")):
+        sums = example_sums(0.7, seed)
+        for sequence in sums["sequences"].values():
+            for rows in sequence["visible"].values():
+                rows[0] = [0] * 20
+        example_run(tmp_path / extent, sums, extent=extent)
+    (found,) = group(find_runs(tmp_path).scored)
+    _, apart = occlusion_tables(amodalization(found), Analysis(found, 200, 1), None)
+    (row,) = apart.blocks[0].rows
+    assert row.cells["0-20 %"] is None
+    assert row.cells["20-40 %"] is not None
+
+
 def test_runs_without_a_seed_in_common_have_no_difference(tmp_path: Path) -> None:
     for seed, extent in ((1, "shrink_wrap"), (2, "track_max")):
         example_run(tmp_path / extent, example_sums(0.7, seed), seed=seed, extent=extent)
@@ -88,13 +108,93 @@ def test_runs_without_a_seed_in_common_have_no_difference(tmp_path: Path) -> Non
     assert ours(table) == {"Modal Det. (MAX)": {}}
 
 
+def test_seeds_on_one_stage_1_are_no_independent_trainings(tmp_path: Path) -> None:
+    """Three seeds of stage 2 on one stage 1, and three of both stages: means are those of the seeds all the same."""
+    for seed in (1, 2, 3):
+        for membership, settings in (("full", {}), ("geometric", {"stage1": "first"})):
+            sums, beside = example_sums(0.4 + 0.1 * seed, seed, sequences=("09",)), example_sums(0.4, seed, ("09",))
+            example_run(
+                tmp_path / f"{membership}{seed}", sums, seed=seed, membership=membership, nearest=beside, **settings
+            )
+    (found,) = group(find_runs(tmp_path).scored)
+    analysis, ways = Analysis(found, 200, 1), memberships(found)
+    table = ablation_table(ways, analysis)
+    rows = {row.title: row for block, row in table.rows() if block.ours}
+    alone, shared = rows["+ Point feat. (full)"], rows["PointSegMLP (semantic + geometric)"]
+    assert (seeds(alone), seeds(shared)) == ("1, 2, 3", "1, 2, 3 on one stage 1")
+    assert alone.cells["PQ"].value == pytest.approx(shared.cells["PQ"].value)
+    assert alone.cells["PQ"].low < alone.cells["PQ"].value < alone.cells["PQ"].high
+    assert shared.cells["PQ"].low is None  # one training on one sequence
+    said = [*remarks(found)]
+    assert SHARED in said
+    assert ALONE not in said
+    assert "3 seeds are too narrow" in said[-1]
+    differences = difference_table(ways, analysis, "full")
+    (row,) = (row for row in differences.blocks[0].rows if row.title == shared.title)
+    assert row.parts == [[1, 2, 3]]
+    assert row.cells["PQ"].low is None
+
+
+def test_seeds_are_parted_by_what_any_row_says_of_them(tmp_path: Path) -> None:
+    example_run(tmp_path, example_sums(0.7, 1))
+    (one,) = find_runs(tmp_path).scored
+
+    def row(*stages1: str) -> dict[int, Scored]:
+        return {seed: replace(one, stage1=stage1) for seed, stage1 in enumerate(stages1, start=1)}
+
+    assert units(row("a", "b", "c")) == [[1], [2], [3]]
+    assert units(row("a", "b", "b", "d"), row("a", "a", "c")) == [[1, 2, 3]]
+    assert units(row("a", "b", "b", "d"), row("a", "b", "c", "d")) == [[1], [2, 3], [4]]
+    assert units(row("a"), {}) == []
+
+
+def test_occlusion_is_a_table_with_differences_where_runs_know_it(analysis: Analysis, tmp_path: Path) -> None:
+    whole, apart = occlusion_tables(amodalization(analysis.group), analysis, "track_max")
+    assert whole.columns == apart.columns == ("0-20 %", "20-40 %", "40-60 %", "60-80 %", "80-100 %")
+    assert len(ours(whole)) == 5
+    assert apart.title.endswith("share of the object that is seen, differences to Modal Det. (MAX)")
+    assert ours(apart).keys() == ours(whole).keys() - {"Modal Det. (MAX)"}
+    assert "Objects in all scans: 480 of 0-20 %" in whole.notes[1]  # 40 of each of three classes in four sequences
+    old = example_sums(0.7, 1)
+    del old["visible_edges"]
+    for sequence in old["sequences"].values():
+        del sequence["visible"]
+    for seed, sums in ((1, old), (2, example_sums(0.7, 1))):
+        example_run(tmp_path / f"{seed}", sums, seed=seed)
+    (found,) = group(find_runs(tmp_path).scored)  # of both versions
+    (partly,) = occlusion_tables(amodalization(found), Analysis(found, 200, 1), None)
+    assert ours(partly) == {"Modal Det. (MAX)": {}}
+    assert UNSEEN in partly.notes
+    assert UNSEEN not in whole.notes
+    example_run(tmp_path / "old", old)
+    (found,) = group(find_runs(tmp_path / "old").scored)
+    assert occlusion_tables(amodalization(found), Analysis(found, 200, 1), None) == []
+
+
+def test_predictions_that_do_not_say_how_they_were_made_are_named(tmp_path: Path) -> None:
+    example_run(tmp_path, example_sums(0.7, 1))
+    (tmp_path / "evaluated").mkdir()
+    said = {"prediction": {"membership": "clustering", "changed": ["tracker.motion=kalman"]}}
+    for name, told in (("nearest", {}), ("clustering", said)):
+        report = {"panoptic": {"sums": example_sums(0.8, 2, tracked=True)}} | told
+        (tmp_path / "evaluated" / f"{name}.json").write_text(json.dumps(report))
+    (found,) = group(find_runs(tmp_path).scored)
+    analysis = Analysis(found, 200, 1)
+    notes = ablation_table(memberships(found), analysis).notes
+    assert [note for note in notes if UNTOLD in note] == [f"Nearest neighbour (baseline): {UNTOLD}"]
+    (table5,) = (table for table in benchmark_tables(analysis) if table.name == "table5")
+    assert "Modal Det. (MAX), clustering: tracker.motion=kalman." in table5.notes
+
+
 def test_orders_are_said_with_their_confidence(analysis: Analysis) -> None:
     parts = {"table1": amodalization(analysis.group), "table2": memberships(analysis.group)}
     table = order_table(parts, analysis)
-    assert table.words["track_max above shrink_wrap"] == "shows (in 100.0 % of draws)"
-    papers = {row.title: row.cells["PQ"].value for block, row in table.rows() if not block.ours}
-    assert papers["track_max above shrink_wrap"] == pytest.approx(0.033)
-    assert papers["full above nearest"] == pytest.approx(0.029)
+    assert table.words["MAX above SW"] == "shown (100.0 % of draws agree)"
+    assert re.match(r"Does the paper's order show\? Of 10: \d+ shown, \d+ reversed, \d+ open", table.title)
+    rows = {row.title: row.cells for row in table.blocks[0].rows}
+    assert rows["MAX above SW"]["paper: PQ"].value == pytest.approx(0.033)
+    assert rows["full above nearest"]["paper: PQ"].value == pytest.approx(0.029)
+    assert rows["full above nearest"]["paper: PQ Th"] is None  # Table II has none
     interval = analysis.differences(
         *(analysis.group.by_seed(each) for each in analysis.group.strategies[:2]), {"": "pq"}
     )
@@ -151,9 +251,15 @@ def test_every_layout_tells_ours_from_the_papers(tmp_path: Path) -> None:
     assert text.index("**Measured here") < text.index("**The paper's own figures")
     assert "differences to Modal Det. (DSB)" in text
     assert f"{100 * float(of_max['ours']['PQ']):.1f} (" in text
-    assert sorted(path.stem for path in (out / "plots").iterdir()) == ["distance", "extents", "membership", "points"]
+    assert sorted(path.stem for path in (out / "plots").iterdir()) == [
+        "distance",
+        "extents",
+        "membership",
+        "points",
+        "visible",
+    ]
     tex = (out / "report.tex").read_text()
-    assert tex.count(r"\begin{tabular}") == tex.count(r"\end{tabular}") == 7
+    assert tex.count(r"\begin{tabular}") == tex.count(r"\end{tabular}") == 9
     assert not re.search(r"(?<!\\)[_&%#](?![^\n]*\\\\)", re.sub(r"\\label\{.*?\}|^%.*$", "", tex, flags=re.M))
 
 
@@ -187,6 +293,6 @@ def test_a_bin_without_instances_leaves_a_gap_in_its_curve_alone(tmp_path: Path)
     (found,) = group(find_runs(tmp_path).scored)
     parts = {"table1": amodalization(found), "table2": memberships(found)}
     drawn = {plot.name: plot.svg for plot in plots(parts, Analysis(found, 200, 1))}
-    assert set(drawn) == {"extents", "distance", "points", "membership"}
+    assert set(drawn) == {"extents", "visible", "distance", "points", "membership"}
     marks = {name: drawn[name].count("<use ") for name in ("distance", "points")}
     assert marks["points"] - marks["distance"] == 3  # seven bins and seven ticks, five bins and six ticks

@@ -9,6 +9,7 @@ from example_runs import example_run, example_sums, example_sweep
 from most.errors import DataError
 from most.reports.groups import group
 from most.reports.runs import find_runs
+from most.reports.settings import NO_FIGURE
 
 
 def ways(folder: Path) -> list[tuple[str, str, int, str]]:
@@ -26,11 +27,11 @@ def test_stage_1_alone_is_scored_by_what_needs_no_training(tmp_path: Path) -> No
     example_run(tmp_path / "1", sums, membership="full")
     example_run(tmp_path / "2", sums, membership="clustering")
     example_run(tmp_path / "3", sums, backbone={"separate": True}, extent="shrink_wrap")
-    path = example_run(tmp_path / "4", sums) / ".hydra/hydra.yaml"
-    path.write_text(path.read_text().replace("membership: full", "membership: full\n      heads: offset_regression"))
+    example_run(tmp_path / "4", sums, heads="offset_regression")
+    example_run(tmp_path / "5", sums, heads="offset_regression", extent="amodal")
     assert [way[:2] for way in ways(tmp_path)] == [
         ("track_max", "nearest"), ("track_max", "clustering"), ("shrink_wrap+separate", "nearest"),
-        ("offset_regression", "mean_shift"),
+        ("offset_regression", "mean_shift"), ("offset_regression+amodal", "mean_shift"),
     ]  # fmt: skip
 
 
@@ -126,6 +127,60 @@ def test_other_sequences_or_settings_are_groups_of_their_own_that_say_what_tells
     assert "backbone.widths=[4, 8]" in first.title
     assert {len(each.rows) for each in others} == {1}
     assert sorted("1 sequence (07)" in each.title for each in others) == [False, True]
+
+
+def test_two_runs_that_differ_in_an_extent_that_nothing_uses_are_one(tmp_path: Path) -> None:
+    for extent in ("track_max", "shrink_wrap"):
+        example_run(tmp_path / extent, example_sums(0.7, 1), heads="offset_regression", extent=extent)
+    with pytest.raises(DataError, match=r"one run of offset_regression \(offset_regression uses no extent\), .*seed 1"):
+        group(find_runs(tmp_path).scored)
+
+
+def evaluated(run: Path, name: str, **prediction: object) -> None:
+    report = {"scans": 40, "panoptic": {"sums": example_sums(0.8, 2, tracked=True)}}
+    (run / "evaluated").mkdir(exist_ok=True)
+    (run / "evaluated" / f"{name}.json").write_text(
+        json.dumps(report | ({"prediction": prediction} if prediction else {}))
+    )
+
+
+def test_what_predictions_say_of_themselves_counts_more_than_the_name_of_a_file(tmp_path: Path) -> None:
+    run = example_run(tmp_path / "run", example_sums(0.7, 1), nearest=example_sums(0.6, 1))
+    evaluated(run, "wide", membership="clustering", changed=["membership.margin=2.0", "tracker.motion=nearest"])
+    evaluated(run, "clustering")
+    evaluated(run, "again", membership="trained", changed=[])
+    found = {each.strategy.membership: each for each in find_runs(tmp_path).scored if each.source == "evaluated"}
+    assert set(found) == {"clustering (margin=2.0)", "clustering", "full"}
+    assert found["clustering (margin=2.0)"].told == ("membership.margin=2.0", "tracker.motion=nearest")
+    assert found["full"].told == ()
+    assert found["clustering"].told is None
+
+
+def test_stage_1_is_told_by_where_it_was_trained(tmp_path: Path) -> None:
+    """Of itself, or of another's folder or checkpoint, from wherever that was named; copies keep what was."""
+    sums, beside = example_sums(0.7, 1), example_sums(0.6, 1)
+    example_run(tmp_path / "one", sums)
+    best = "./one/checkpoints/detection-best.ckpt"
+    places = ("one", best, "/trained/one", "/elsewhere/weights.ckpt", "seed-${seed}", "${nothing}")
+    for number, place in enumerate(places):
+        example_run(tmp_path / f"{number}", sums, seed=number, nearest=beside, stage1=place)
+    found = {each.folder.name: each.stage1 for each in find_runs(tmp_path).scored}
+    assert found == {
+        **dict.fromkeys(("one", "0", "1", "2"), "/trained/one"),
+        "3": "/elsewhere/weights.ckpt",
+        "4": "/trained/seed-4",
+        "5": "/trained/${nothing}",
+    }
+
+
+def test_what_changes_no_figure_for_a_sweep_changes_none_for_a_report(tmp_path: Path) -> None:
+    for number in (1, 2):
+        settings = {"name": f"try{number}", "trainer": {"threads": number}, "logger": {"kind": "none", "mode": number}}
+        example_run(tmp_path / str(number), example_sums(0.7, number), seed=number, **settings)
+    (found,) = group(find_runs(tmp_path).scored)
+    assert found.title.startswith("sim_demo on simulated")
+    assert sorted(found.by_seed(found.strategies[0])) == [1, 2]
+    assert {"name", "logger", "trainer.threads"} <= {*NO_FIGURE}
 
 
 def test_two_runs_of_one_strategy_and_seed_are_refused(tmp_path: Path) -> None:

@@ -10,13 +10,13 @@ from torch import Tensor
 
 from most.metrics.exact_sums import exact_parts, joined
 from most.metrics.lstq import Association, associate_by_sequence, lstq_nuscenes, lstq_per_class, lstq_semantickitti
-from most.metrics.overlaps import find_overlaps
+from most.metrics.overlaps import find_overlaps, totals
 from most.metrics.panoptic import PanopticStatistics
 from most.metrics.running import COUNTS
 from most.metrics.table_metric import TableMetric
 from most.metrics.tables import table
 from most.metrics.tracking import TrackingRules, TrackingStatistics, TrackMemory, tracking_statistics
-from most.metrics.tracking_figures import tracking_figures, tracking_per_class
+from most.metrics.tracking_figures import track_qualities, tracking_figures, tracking_per_class
 from most.metrics.tubes import TubeRules, TubeStatistics, tube_statistics
 
 
@@ -94,7 +94,6 @@ class PanopticTracking(TableMetric):
     """
 
     tables = ("tracks", "hits", "predictions")
-    switches: Tensor
     iou_sum: Tensor
     soft_switches: Tensor
 
@@ -107,12 +106,12 @@ class PanopticTracking(TableMetric):
         zeros = PanopticStatistics.zeros(len(self.class_names))
         for name in COUNTS:
             self.add_state(name, default=getattr(zeros, name), dist_reduce_fx="sum")
-        self.add_state("switches", default=torch.zeros_like(zeros.tp), dist_reduce_fx="sum")
         for name in ("iou_sum", "soft_switches"):
             self.add_state(name, default=exact_parts(zeros.iou_sum), dist_reduce_fx="sum")
         self.add_table("tracks", keys=3, amounts=2)
         self.add_table("hits", keys=4, amounts=1)
         self.add_table("predictions", keys=2, amounts=2)
+        self.add_table("switches", keys=2, amounts=1)  # of a sequence's class
         self.add_table("sequences", keys=1, amounts=1)  # how many processes saw each
 
     def update(
@@ -131,7 +130,8 @@ class PanopticTracking(TableMetric):
         scan, self._memories[sequence] = tracking_statistics(overlaps, sequence, memory, self.rules)
         for name in COUNTS:
             getattr(self, name).add_(getattr(scan.panoptic, name).to(self.device))
-        self.switches.add_(scan.switches.to(self.device))
+        switched = np.flatnonzero(scan.switches.numpy())
+        self.add_rows("switches", table(sequence, switched, scan.switches.numpy()[switched]))
         self.iou_sum.add_(exact_parts(scan.panoptic.iou_sum).to(self.device))
         self.soft_switches.add_(exact_parts(scan.soft_switches).to(self.device))
         for name in self.tables:
@@ -153,6 +153,20 @@ class PanopticTracking(TableMetric):
         with self.sync_context():
             return tracking_per_class(self._statistics(), self.class_names)
 
+    def by_sequence(self) -> dict[int, dict[str, list[Any]]]:
+        """Return ``{switches: [by class], tq: [their sum, tracks]}`` of each sequence that has tracks or switches.
+
+        PTQ and PAT are formed of their sums and those of PQ. Call it on every process.
+        """
+        with self.sync_context():
+            switches, qualities = self.rows("switches"), track_qualities(self._statistics())
+        found: dict[int, dict[str, list[Any]]] = {}
+        for sequence in np.union1d(switches[:, 0], qualities.sequences).tolist():
+            own = qualities.official[qualities.sequences == sequence]
+            changes = _by_class(switches[switches[:, 0] == sequence], len(self.class_names))
+            found[sequence] = {"switches": changes.tolist(), "tq": [float(own.sum()), len(own)]}
+        return found
+
     def reset(self) -> None:
         """Forget all scans."""
         super().reset()
@@ -165,7 +179,12 @@ class PanopticTracking(TableMetric):
         counts = {name: getattr(self, name).cpu() for name in COUNTS}
         return TrackingStatistics(
             PanopticStatistics(iou_sum=joined(self.iou_sum).cpu(), **counts),
-            self.switches.cpu(),
+            torch.from_numpy(_by_class(self.rows("switches"), len(self.class_names))),
             joined(self.soft_switches).cpu(),
             *(self.rows(name) for name in self.tables),
         )
+
+
+def _by_class(switches: Int64[np.ndarray, "rows 3"], num_classes: int) -> Int64[np.ndarray, "classes"]:
+    """Add up a table of sequence, class and switches."""
+    return totals(switches[:, 1], switches[:, 2], num_classes)

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Float, Float64, Int64
-from torch import Tensor
+from jaxtyping import Float64, Int64
 
 from most.metrics.exact_sums import exact_parts
-from most.metrics.overlaps import Overlaps, Segments, among
+from most.metrics.overlaps import among
 from most.metrics.panoptic import Outcomes
+from most.metrics.places import Places
 
 DISTANCES = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0)  # m, where bins begin; the last one has no end
 POINTS = (1, 15, 50, 100, 200, 500, 1000)  # the official thresholds of both datasets are among them
@@ -73,49 +73,9 @@ class SegmentSums:
         return {name: getattr(self, name).tolist() for name in ("tp", "fp", "fn")} | {"iou": self.iou.sum(0).tolist()}
 
 
-@dataclass
-class Distances:
-    """How far the segments of a scan's things are from the sensor: the mean of their points, over ground, in m."""
-
-    pred: Float64[np.ndarray, "predicted"]  # 0 for stuff, likewise below
-    truth: Float64[np.ndarray, "true"]
-
-    @classmethod
-    def of(
-        cls,
-        points: Float[Tensor, "points 3"],
-        overlaps: Overlaps,
-        pred: tuple[Int64[Tensor, "points"], Int64[Tensor, "points"]],
-        truth: tuple[Int64[Tensor, "points"], Int64[Tensor, "points"]],
-        things: Sequence[int],
-    ) -> "Distances":
-        """Measure the segments of ``overlaps``, which were found in ``pred`` and ``truth``: classes and keys."""
-        ground = points[:, :2].cpu().numpy()
-        found = ((overlaps.pred, pred), (overlaps.truth, truth))
-        return cls(*(_distances(ground, segments, *labels, things) for segments, labels in found))
-
-
-def _distances(
-    ground: Float[np.ndarray, "points 2"],
-    segments: Segments,
-    classes: Int64[Tensor, "points"],
-    keys: Int64[Tensor, "points"],
-    things: Sequence[int],
-) -> Float64[np.ndarray, "segments"]:
-    of_point, key = classes.cpu().numpy(), keys.cpu().numpy()
-    own = np.flatnonzero(among(of_point, things) & np.isfinite(ground).all(1))
-    stride = max(things) + 1
-    things_at = np.flatnonzero(among(segments.classes, things))
-    codes = segments.keys[things_at] * stride + segments.classes[things_at]  # ascending, as segments are
-    segment = things_at[np.searchsorted(codes, key[own] * stride + of_point[own])]
-    count = np.maximum(np.bincount(segment, minlength=len(segments.keys)), 1)
-    x, y = (np.bincount(segment, axis[own], len(segments.keys)) / count for axis in ground.T)
-    return np.hypot(x, y)
-
-
-def by_distance(outcomes: Outcomes, distances: Distances, num_classes: int, things: Sequence[int]) -> SegmentSums:
+def by_distance(outcomes: Outcomes, places: Places, num_classes: int, things: Sequence[int]) -> SegmentSums:
     """Count the things that count officially by their distance."""
-    true_bins, pred_bins = (np.searchsorted(DISTANCES, d, "right") - 1 for d in (distances.truth, distances.pred))
+    true_bins, pred_bins = (np.searchsorted(DISTANCES, d, "right") - 1 for d in (places.truth, places.pred))
     return SegmentSums.of(outcomes, true_bins, pred_bins, len(DISTANCES), num_classes).of_classes(things)
 
 

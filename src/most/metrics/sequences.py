@@ -39,12 +39,14 @@ class SequenceScores:
         self.lstq.update(number, semantics, labels, truth_semantics, truth_labels)
         self.tracking.update(number, semantics, labels, truth_semantics, truth_labels)
 
-    def associations(self) -> dict[str, dict[str, list[float]]]:
-        """Return ``{assoc, tubes}`` by class of each sequence: what S_assoc is summed of."""
-        found, size = self.lstq.by_sequence(), self.taxonomy.num_classes
-        none = {"assoc": [0.0] * size, "tubes": [0] * size}
-        plain = {n: {"assoc": each.sums.tolist(), "tubes": each.tubes.tolist()} for n, each in found.items()}
-        return {name: plain.get(number, none) for name, number in self.numbers.items()}
+    def sums(self) -> dict[str, dict[str, list[Any]]]:
+        """Return of each sequence what S_assoc is summed of, on nuScenes also PTQ and PAT, as ``sums`` has it."""
+        size, found = self.taxonomy.num_classes, self.lstq.by_sequence()
+        none: dict[str, list[Any]] = {"assoc": [0.0] * size, "tubes": [0] * size}
+        tubes = {number: {"assoc": each.sums.tolist(), "tubes": each.tubes.tolist()} for number, each in found.items()}
+        tracks = {} if self.tracking is None else self.tracking.by_sequence()
+        untracked: dict[str, list[Any]] = {} if self.tracking is None else {"switches": [0] * size, "tq": [0.0, 0]}
+        return {name: tubes.get(number, none) | tracks.get(number, untracked) for name, number in self.numbers.items()}
 
     def report(self) -> dict[str, Any]:
         """Return the section ``lstq``, or on nuScenes ``tracking``, with ``per_class``; fractions in [0, 1]."""
@@ -76,10 +78,10 @@ class LabelScores:
         self.sequences.update(sequence, semantics, labels, truth_semantics, truth_labels)
 
     def plain_sums(self) -> dict[str, Any]:
-        """Return the section ``sums``, see :mod:`most.metrics.split_sums`, with what S_assoc is made of."""
+        """Return the section ``sums``, see :mod:`most.metrics.split_sums`, with what 4D figures are made of."""
         section = self.sums.plain()
-        for name, tubes in self.sequences.associations().items():
-            section["sequences"][name] |= tubes
+        for name, sums in self.sequences.sums().items():
+            section["sequences"][name] |= sums
         return section
 
     def report(self) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
     {"evaluator": whose rules, "classes": [names by training id, void first], "things": [ids], "min_points": theirs,
      "distance_edges": [m], "points_edges": [points],     where bins begin; the last one has no end
+     "visible_edges": [share],                            the last one ends at 1
      "sequences": {NAME: {
         "scans": 3,
         "tp" "fp" "fn" "iou": [by class]                  segments, and the sum of the matches' IoU: PQ, SQ, RQ
@@ -9,9 +10,12 @@
         "membership": [correct, total, contested correct, contested total] or null
         "distance": {"tp" "fp" "fn" "iou": [by bin [by class]]} or null       things alone, the official ones
         "points": the same                                                   all things, those too small included
+        "visible": the same or null                       objects, by how much of them is seen: see metrics.sightings
         "assoc" "tubes": [by class]                       of most.evaluate alone: S_assoc = all assoc / things' tubes
+        "switches": [by class], "tq": [their sum, tracks] of most.evaluate on nuScenes alone: PTQ and PAT
      }}}
 
+Reports of earlier versions have no "visible", "switches" and "tq", and can be read all the same.
 Everything adds up over scans, sequences and processes; figures are formed of sums of whatever sequences one likes.
 """
 
@@ -25,8 +29,9 @@ from torch import Tensor
 
 from most.datasets.taxonomy import Taxonomy
 from most.metrics.membership import MembershipCounts
-from most.metrics.overlaps import find_overlaps
+from most.metrics.overlaps import among, find_overlaps
 from most.metrics.panoptic import (
+    Outcomes,
     PanopticStatistics,
     PointCounts,
     confusion_of,
@@ -34,7 +39,9 @@ from most.metrics.panoptic import (
     panoptic_figures,
     per_class,
 )
-from most.metrics.segment_sums import DISTANCES, POINTS, Distances, SegmentSums, by_distance, by_points
+from most.metrics.places import Places
+from most.metrics.segment_sums import DISTANCES, POINTS, SegmentSums, by_distance, by_points
+from most.metrics.sightings import VISIBLE, Sightings, by_visible
 from most.processes import everyones
 
 
@@ -47,6 +54,7 @@ class SequenceSums:
     segments: SegmentSums  # in one bin
     distance: SegmentSums | None  # None where the places of the points were not given
     points: SegmentSums
+    sightings: list[Sightings] | None  # of each scan; of one sequence alone can they be counted
     membership: MembershipCounts | None  # None where no detections were given
 
     @classmethod
@@ -54,7 +62,7 @@ class SequenceSums:
         """The sums of no scan at all; ``num_classes`` includes void."""
         segments, distance, points = (SegmentSums.zeros(bins, num_classes) for bins in (1, len(DISTANCES), len(POINTS)))
         confusion = torch.zeros(num_classes, num_classes, dtype=torch.int64)
-        return cls(0, confusion, segments, distance, points, MembershipCounts())
+        return cls(0, confusion, segments, distance, points, [], MembershipCounts())
 
     def __add__(self, other: "SequenceSums") -> "SequenceSums":
         pairs = {name: (value, getattr(other, name)) for name, value in vars(self).items()}
@@ -78,6 +86,7 @@ class SequenceSums:
             "membership": None if self.membership is None else list(astuple(self.membership)),
             "distance": None if self.distance is None else self.distance.plain(),
             "points": self.points.plain(),
+            "visible": None if self.sightings is None else by_visible(self.sightings, len(self.confusion)).plain(),
         }
 
 
@@ -101,16 +110,22 @@ class SplitSums:
         size, things = self.taxonomy.num_classes, self.taxonomy.things
         official = outcomes(overlaps, self.taxonomy.min_points)
         everywhere = np.zeros(max(len(overlaps.pred.keys), len(overlaps.truth.keys)), dtype=np.int64)
-        places = None if points is None else Distances.of(points, overlaps, pred, truth, things)
+        places = None if points is None else Places.of(points, overlaps, pred, truth, things)
         scan = SequenceSums(
             scans=1,
             confusion=confusion_of(overlaps, size),
             segments=SegmentSums.of(official, everywhere, everywhere, 1, size),
             distance=None if places is None else by_distance(official, places, size, things),
             points=by_points(outcomes(overlaps, 1), size, things),
+            sightings=None if places is None else [self._sightings(official, places)],
             membership=membership,
         )
         self._add(sequence, scan)
+
+    def _sightings(self, official: Outcomes, places: Places) -> Sightings:
+        truth, things = official.overlaps.truth, self.taxonomy.things
+        objects = among(truth.classes, things) & (self.taxonomy.instance_of(torch.from_numpy(truth.keys)).numpy() != 0)
+        return Sightings.of(official, places.lengths, objects, things)
 
     def of_all_processes(self) -> "SplitSums":
         """Return the sums of what all processes saw; each of them has to call it."""
@@ -142,6 +157,7 @@ class SplitSums:
             "min_points": self.taxonomy.min_points,
             "distance_edges": list(DISTANCES),
             "points_edges": list(POINTS),
+            "visible_edges": list(VISIBLE),
             "sequences": {name: self.sequences[name].plain() for name in sorted(self.sequences)},
         }
 

@@ -33,6 +33,7 @@ from most.metrics.tracking import TrackingStatistics
 class TrackQualities:
     """The quality of each track of the truth."""
 
+    sequences: Int64[np.ndarray, "tracks"]
     classes: Int64[np.ndarray, "tracks"]
     official: Float64[np.ndarray, "tracks"]
     repaired: Float64[np.ndarray, "tracks"]
@@ -62,7 +63,8 @@ def track_qualities(statistics: TrackingStatistics) -> TrackQualities:
         association = np.bincount(track_of, scans**2 / (length[track_of] + elsewhere), len(tracks)) / length
         return np.sqrt(association * steady)
 
-    return TrackQualities(tracks[:, 1], quality(np.where(enough > 0, enough - scans, 0)), quality(counted - scans))
+    official, repaired = quality(np.where(enough > 0, enough - scans, 0)), quality(counted - scans)
+    return TrackQualities(tracks[:, 0], tracks[:, 1], official, repaired)
 
 
 def class_tracking(statistics: TrackingStatistics) -> ClassTracking:

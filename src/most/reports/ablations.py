@@ -3,9 +3,9 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from most.reports.analysis import BySeed
 from most.reports.groups import Group
 from most.reports.strategy import Strategy
+from most.reports.units import BySeed
 
 AMODALIZATION = {
     "PQ": "pq", "PQ Th": "pq_things", "PQ St": "pq_stuff",
@@ -19,6 +19,7 @@ PRESENT = (
     "PQ present: the mean over the classes that the held-out sequences have; official means count absent ones as 0."
 )
 CONTESTED = "contested: membership accuracy of the points that lie in the regions of several objects alone."
+SMALL = "DSB drops instances of few points here (extent.min_points), whatever their size; the paper drops small boxes."
 
 
 @dataclass(frozen=True)
@@ -31,11 +32,11 @@ class Ablation:
     columns: dict[str, str]
     notes: tuple[str, ...]
     first: str  # what differences are against unless another is chosen
-    beside: bool  # nearest centres are those of the runs that trained stage 2
+    beside: bool  # rows are memberships, and nearest centres those of the runs that trained stage 2
 
     def title_of(self, strategy: Strategy) -> str:
         """A row's title."""
-        return strategy.title if self.name == "table1" else strategy.membership_title
+        return strategy.membership_title if self.beside else strategy.title
 
     def runs(self, group: Group, strategy: Strategy) -> BySeed:
         """A row's runs."""
@@ -53,6 +54,7 @@ def amodalization(group: Group) -> Ablation:
     rows = {each.detection: each for each in [*offsets, *widest]}
     ways = dict.fromkeys(each.membership_title for each in rows.values())
     notes = (f"Membership here: {'; '.join(ways)}.", *_settings(group), PRESENT)
+    notes += (SMALL,) if any(each.extent.startswith("drop_small") for each in rows.values()) else ()
     title = "Table I: strategies for amodalization"
     return Ablation("table1", title, rows, AMODALIZATION, notes, "shrink_wrap", beside=False)
 

@@ -1,7 +1,7 @@
 """Figures with intervals of a group's strategies, and differences between two under the same draws."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -12,17 +12,19 @@ from most.reports.figures import Figures, Presence, figures
 from most.reports.groups import Group
 from most.reports.runs import Scored
 from most.reports.table import Cells
-
-BySeed = Mapping[int, Scored]  # a strategy's runs
+from most.reports.units import BySeed, units
 
 
 class Analysis:
-    """Resamples a group's runs; each run's figures are formed once."""
+    """Resamples a group's runs; each run's figures are formed once.
+
+    Where seeds stand on one stage 1, their mean is one draw's unit: they were not trained independently.
+    """
 
     def __init__(self, group: Group, draws: int, seed: int) -> None:
         self.group = group
         self.resampling = Resampling(len(group.measured.sequences), draws, seed)
-        self._known: dict[int, Figures] = {}
+        self._formed: dict[int, Figures] = {}
 
     def cells(self, runs: BySeed, columns: Mapping[str, str]) -> Cells:
         """Means over seeds with their intervals; ``columns`` are the figures' keys by title."""
@@ -30,11 +32,11 @@ class Analysis:
 
     def differences(self, runs: BySeed, others: BySeed, columns: Mapping[str, str]) -> Cells:
         """How much higher the figures of ``runs`` are, over the seeds that both have; None without such."""
-        seeds = sorted(runs.keys() & others.keys())
+        common = units(runs, others)
         found: Cells = {}
         for title, key in columns.items():
-            ours, theirs = (self._drawn({seed: each[seed] for seed in seeds}, key) for each in (runs, others))
-            found[title] = None if ours is None or theirs is None else self.resampling.interval(ours - theirs)
+            ours, theirs = (self._drawn(each, common, key) for each in (runs, others))
+            found[title] = None if ours is None or theirs is None else self._known(ours - theirs)
         return found
 
     def by_seed(self, runs: BySeed, key: str) -> dict[int, float]:
@@ -43,22 +45,29 @@ class Analysis:
         return {seed: float(each[key][0]) for seed, each in found.items() if key in each}
 
     def _interval(self, runs: BySeed, key: str) -> Interval | None:
-        if (drawn := self._drawn(runs, key)) is not None:
-            found = self.resampling.interval(drawn)
-            return found if math.isfinite(found.value) else None
+        if (drawn := self._drawn(runs, units(runs), key)) is not None:
+            return self._known(drawn)
         official = [_reported(each, key) for each in runs.values()]
         known = [value for value in official if value is not None]
         return Interval(float(np.mean(known))) if known and len(known) == len(official) else None
 
-    def _drawn(self, runs: BySeed, key: str) -> Float64[np.ndarray, "draws seeds"] | None:
-        """A figure in each draw, a column for each seed in ascending order; None where a run does not have it."""
-        found = [self._figures(runs[seed]) for seed in sorted(runs)]
-        return np.stack([each[key] for each in found], 1) if found and all(key in each for each in found) else None
+    def _known(self, drawn: Float64[np.ndarray, "draws units"]) -> Interval | None:
+        found = self.resampling.interval(drawn)
+        return found if math.isfinite(found.value) else None
+
+    def _drawn(
+        self, runs: BySeed, parts: Sequence[Sequence[int]], key: str
+    ) -> Float64[np.ndarray, "draws units"] | None:
+        """A figure in each draw, a column for each part of the seeds; None where a run does not have it."""
+        found = [[self._figures(runs[seed]) for seed in part] for part in parts]
+        if not found or not all(key in each for part in found for each in part):
+            return None
+        return np.stack([np.mean([each[key] for each in part], 0) for part in found], 1)
 
     def _figures(self, run: Scored) -> Figures:
-        if id(run) not in self._known:
-            self._known[id(run)] = figures(run.sums, self._presence, self._weights)
-        return self._known[id(run)]
+        if id(run) not in self._formed:
+            self._formed[id(run)] = figures(run.sums, self._presence, self._weights)
+        return self._formed[id(run)]
 
     @cached_property
     def _weights(self) -> Float64[np.ndarray, "draws sequences"]:

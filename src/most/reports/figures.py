@@ -33,7 +33,7 @@ class Presence:
 
 
 def figures(sums: Sums, presence: Presence, weights: Float64[np.ndarray, "draws sequences"]) -> Figures:
-    """All figures of one run in each draw, fractions; ``distance/BIN`` and ``points/BIN`` among them.
+    """All figures of one run in each draw, fractions; ``distance/BIN``, ``points/BIN`` and ``visible/BIN`` among them.
 
     ``pq/CLASS`` is there for the classes that the held-out sequences have.
     """
@@ -51,6 +51,7 @@ def figures(sums: Sums, presence: Presence, weights: Float64[np.ndarray, "draws 
     named = [(index, name) for index, name in enumerate(sums.measured.classes) if ever["segments"][index]]
     found |= {f"pq/{name}": of_class["pq"][:, index] for index, name in named}
     tracking = _tracking(sums, weights, of_class, found["miou"])
+    tracking |= _tracks(sums, weights, there["segments"], found["pq"])
     return found | _binned(sums, weights) | _memberships(sums, weights) | tracking
 
 
@@ -84,7 +85,7 @@ def _dagger(
 def _binned(sums: Sums, weights: Float64[np.ndarray, "draws sequences"]) -> Figures:
     """PQ of all things together in each bin, NaN where there is none."""
     found: Figures = {}
-    for name in ("distance", "points"):
+    for name in ("distance", "points", "visible"):
         if (counts := getattr(sums, name)) is None:
             continue
         tp, fp, fn, iou = np.moveaxis(np.tensordot(weights, counts, 1), 1, 0)
@@ -116,6 +117,24 @@ def _tracking(
     with np.errstate(invalid="ignore", divide="ignore"):
         s_assoc = association.sum(1) / tubes[:, list(sums.measured.things)].sum(1)
         return {"lstq": np.sqrt(s_assoc * s_cls), "s_assoc": s_assoc, "s_cls": s_cls}
+
+
+def _tracks(
+    sums: Sums,
+    weights: Float64[np.ndarray, "draws sequences"],
+    there: Bool[np.ndarray, "draws classes"],
+    pq: Float64[np.ndarray, "draws"],
+) -> Figures:
+    """``ptq tq pat`` of nuScenes; see ``most.metrics.tracking_figures``."""
+    if sums.switches is None or sums.tq is None:
+        return {}
+    tp, fp, fn, iou = np.moveaxis(np.tensordot(weights, sums.counts, 1), 1, 0)[: len(SEGMENTS)]
+    of_class = (iou - weights @ sums.switches) / np.maximum(tp + fp / 2 + fn / 2, TINY)
+    with np.errstate(invalid="ignore"):
+        quality, tracks = (weights @ sums.tq).T
+        tq = quality / tracks
+        named = slice(1, None)
+        return {"ptq": _mean(of_class[:, named], there[:, named]), "tq": tq, "pat": 2 * pq * tq / (pq + tq)}
 
 
 def _mean(

@@ -4,7 +4,7 @@ import csv
 import io
 from collections.abc import Iterable
 
-from most.reports.table import Block, Row, Table, between, numbers, percent
+from most.reports.table import Block, Row, Table, between, percent, seeds
 
 LATEX = str.maketrans(
     {"&": r"\&", "%": r"\%", "_": r"\_", "#": r"\#", "$": r"\$", "{": r"\{", "}": r"\}", "+": "{+}",
@@ -60,7 +60,7 @@ def _cells(table: Table, block: Block, row: Row) -> list[str]:
         interval = between(cell, table.signed)
         texts.append(percent(cell, table.signed) + (f" ({interval})" if interval else ""))
     said = [table.words.get(row.title, "") if block.ours else ""] if table.words else []
-    return [row.title, *texts, *said, numbers(row.seeds).removeprefix("seeds ").removeprefix("seed ")]
+    return [row.title, *texts, *said, seeds(row)]
 
 
 def _line(cells: list[str]) -> str:

@@ -7,13 +7,14 @@ from typing import Any
 
 from most.errors import DataError
 from most.reports.runs import BESIDE, EVALUATED, VALIDATED, Scored
+from most.reports.settings import NO_FIGURE, is_of
 from most.reports.strategy import AXES, Strategy, plain_names
 from most.reports.sums import Measured
 
-ASIDE = {  # keys that say who ran it, where and how far it is; or that strategies need to differ in
-    *("seed", "resume", "stage1", "trainer", "logger", "paths", "dataset.root", "dataset.tables", "dataset.workers"),
-    *("dataset.cache", "stage.run", "backbone.separate", *AXES),
-}
+ASIDE = (  # what else runs that are compared may differ in: who ran them and where, and what makes rows of them
+    *("seed", "stage1", "trainer", "dataset.root", "stage.run", "backbone.separate"),
+    *(*NO_FIGURE, *AXES),
+)
 SOURCES = (EVALUATED, VALIDATED, BESIDE)  # of two with the same strategy and seed, the first is taken
 
 
@@ -32,8 +33,9 @@ class Group:
         seeds = self.rows.setdefault(scored.strategy, {}).setdefault(scored.source, {})
         other = seeds.setdefault(scored.seed, scored)
         if other is not scored and scored.source != BESIDE:
+            unused = "" if scored.strategy.has_centres else f" ({scored.strategy.heads} uses no extent)"
             raise DataError(
-                f"{scored.folder}: expected one run of {scored.strategy.detection}, membership "
+                f"{scored.folder}: expected one run of {scored.strategy.detection}{unused}, membership "
                 f"{scored.strategy.membership}, seed {scored.seed}, found another in {other.folder}; keep one in runs"
             )
 
@@ -67,7 +69,9 @@ def group(scored: list[Scored]) -> list[Group]:
 
 def _group(scored: list[Scored]) -> Group:
     """Put together what may be compared."""
-    found = Group("", str(scored[0].choices["dataset"]), scored[0].sums.measured)
+    first = scored[0]
+    name = first.choices.get("experiment") or first.config.get("name")
+    found = Group(str(name), str(first.choices["dataset"]), first.sums.measured)
     found.settings, names = plain_names([each.strategy for each in scored])
     for each in scored:
         found.add(replace(each, strategy=names[each.strategy]))
@@ -79,14 +83,14 @@ def common_part(config: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     flat: dict[str, Any] = {}
     for name, value in config.items():
         key = prefix + str(name)
-        if key in ASIDE:
+        if is_of(key, ASIDE):
             continue
         flat |= common_part(value, f"{key}.") if isinstance(value, Mapping) else {key: value}
     return flat
 
 
 def _entitle(groups: Mapping[str, Group], kept: Mapping[str, Mapping[str, Any]]) -> None:
-    """Name each group by its experiment, dataset and sequences, and by what tells it from the others."""
+    """Add dataset and sequences to each group's title, and what tells it from the others."""
     names = {name for rest in kept.values() for name in rest}
     told = sorted(name for name in names if len({repr(rest.get(name)) for rest in kept.values()}) > 1)
     for key, found in groups.items():
@@ -94,9 +98,7 @@ def _entitle(groups: Mapping[str, Group], kept: Mapping[str, Mapping[str, Any]])
         shown = ", ".join(sequences) if len(sequences) <= 6 else f"{sequences[0]} to {sequences[-1]}"
         scans = sum(count for _, count in found.measured.sequences)
         plural = "" if len(sequences) == 1 else "s"
-        found.title = (
-            f"{kept[key].get('name')} on {found.dataset}: {len(sequences)} sequence{plural} ({shown}), {scans} scans"
-        )
-        differs = [f"{name}={kept[key].get(name)}" for name in told if name not in ("name", "experiment")]
+        found.title += f" on {found.dataset}: {len(sequences)} sequence{plural} ({shown}), {scans} scans"
+        differs = [f"{name}={kept[key].get(name)}" for name in told if name != "experiment"]
         if differs:
             found.title += f" [{'; '.join(differs[:4])}{'; ...' if len(differs) > 4 else ''}]"

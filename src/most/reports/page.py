@@ -8,7 +8,7 @@ from pathlib import Path
 from string import Template
 
 from most.reports.plots import INK, Plot
-from most.reports.table import Block, Row, Table, between, numbers, percent
+from most.reports.table import Block, Row, Table, between, percent, seeds
 
 IDS = re.compile(r'(\bid="|url\(#|href="#)')
 
@@ -18,6 +18,7 @@ class Chapter:
     """What one group of runs has to say: what was exchanged, in tables and plots, then the benchmarks' tables."""
 
     title: str
+    remarks: Sequence[str]  # on all of it
     ablations: Sequence[Table]
     plots: Sequence[Plot]
     benchmarks: Sequence[Table]
@@ -41,7 +42,8 @@ def page(title: str, summary: str, chapters: Sequence[Chapter], left_out: Mappin
 
 
 def _chapter(key: str, chapter: Chapter) -> str:
-    parts = [_table(f"{key}-{table.name}", table) for table in chapter.ablations]
+    parts = [f"<p>{escape(remark)}</p>" for remark in chapter.remarks]
+    parts += [_table(f"{key}-{table.name}", table) for table in chapter.ablations]
     parts += [_figure(f"{key}-{plot.name}", plot) for plot in chapter.plots]
     parts += [_table(f"{key}-{table.name}", table) for table in chapter.benchmarks]
     return f'<section id="{key}" aria-labelledby="{key}-title"><h2 id="{key}-title">{escape(chapter.title)}</h2>\n' + (
@@ -74,11 +76,11 @@ def _row(table: Table, block: Block, row: Row) -> str:
         figure = row.cells.get(column)
         interval = between(figure, table.signed)
         small = f"<small>{escape(interval)}</small>" if interval else ""
-        cells.append(f"<td>{escape(percent(figure, table.signed))}{small}</td>")
+        whose = ' class="paper"' if column in table.papers else ""
+        cells.append(f"<td{whose}>{escape(percent(figure, table.signed))}{small}</td>")
     if table.words:
         cells.append(f'<td class="words">{escape(table.words.get(row.title, "") if block.ours else "")}</td>')
-    seeds = numbers(row.seeds).removeprefix("seeds ").removeprefix("seed ")
-    return f"<tr>{''.join(cells)}<td>{escape(seeds)}</td></tr>"
+    return f"<tr>{''.join(cells)}<td>{escape(seeds(row))}</td></tr>"
 
 
 def _figure(key: str, plot: Plot) -> str:

@@ -26,9 +26,11 @@ def paper_block(name: str) -> Block:
     return Block(f"The paper's own figures: {table['dataset']}", rows, ours=False)
 
 
-def paper_figure(name: str, title: str, column: str) -> float:
-    """One figure, a fraction."""
+def paper_figure(name: str, title: str, column: str) -> float | None:
+    """One figure, a fraction; None where the table has none."""
     table = _content()[name]
+    if column not in table["columns"]:
+        return None
     return float(table["rows"][title][table["columns"].index(column)]) / 100
 
 

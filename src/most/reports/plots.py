@@ -1,4 +1,4 @@
-"""Plots of a group of runs: PQ by strategy, against distance and points, and membership accuracy.
+"""Plots of a group of runs: PQ by strategy, against occlusion, distance and points, and membership accuracy.
 
 Axes and texts have one ink that no page has; on the page it becomes the text's colour, in light as in dark.
 """
@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
-from itertools import pairwise
 from typing import Any
 
 import matplotlib as mpl
@@ -16,10 +15,12 @@ from matplotlib.figure import Figure
 
 from most.reports.ablations import Ablation
 from most.reports.analysis import Analysis
+from most.reports.bins import Bins, by_distance, by_points, by_visible
 from most.reports.bootstrap import Interval
 
 INK = "#010203"
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#7a5195")  # Okabe and Ito's, readable
+PAIRED = "All rows see the same sequences: whether two differ is told by the table of differences, not by an overlap."
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
 STYLE: Any = {
     "svg.fonttype": "none", "font.family": "sans-serif", "font.size": 10, "axes.spines.top": False,
@@ -45,8 +46,7 @@ def plots(ablations: Mapping[str, Ablation], analysis: Analysis) -> list[Plot]:
     measured = analysis.group.measured
     found = [
         _bars("extents", "PQ by extent strategy", strategies, analysis, {"PQ": "pq"}),
-        _curves("distance", "PQ of things against distance", strategies, analysis, measured.distance_edges),
-        _curves("points", "PQ of things against points per instance", strategies, analysis, measured.points_edges),
+        *(_curves(bins, strategies, analysis) for bins in (by_visible(), by_distance(measured), by_points(measured))),
         _bars("membership", "Membership accuracy", ways, analysis,
               {"all": "membership_accuracy", "contested": "membership_accuracy_contested"}),
     ]  # fmt: skip
@@ -79,7 +79,8 @@ def _bars(name: str, title: str, ablation: Ablation, analysis: Analysis, keys: d
         if len(keys) > 1:
             axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=len(keys))
         said = "; ".join(f"{row} {_said(cells)}" for row, cells in found.items())
-        return Plot(name, title, f"{title}, with 95 % intervals; small dots are seeds. {said}.", _svg(figure, name))
+        meaning = f"{title}, with 95 % intervals; small dots are seeds. {said}. {PAIRED}"
+        return Plot(name, title, meaning, _svg(figure, name))
 
 
 def _bar(axes: Axes, at: float, cell: Interval | None, seeds: Iterable[float], series: int, label: str | None) -> None:
@@ -92,50 +93,38 @@ def _bar(axes: Axes, at: float, cell: Interval | None, seeds: Iterable[float], s
     axes.plot([100 * cell.value], [at], MARKS[series], color=COLOURS[series], label=label, markersize=7)
 
 
-def _curves(name: str, title: str, ablation: Ablation, analysis: Analysis, edges: Sequence[float]) -> Plot | None:
-    """A curve for each row, a point for each bin that has instances, with the interval as a band."""
-    bins = {str(index): f"{name}/{index}" for index in range(len(edges))}
+def _curves(bins: Bins, ablation: Ablation, analysis: Analysis) -> Plot | None:
+    """A curve for each row, a point for each bin that has instances, with the interval as a line through it."""
     found = {}
     for each in ablation.rows.values():
-        cells = analysis.cells(ablation.runs(analysis.group, each), bins)
+        cells = analysis.cells(ablation.runs(analysis.group, each), bins.columns)
         if any(cells.values()):
             found[ablation.title_of(each)] = [cell or Interval(math.nan) for cell in cells.values()]
     if not found:
         return None
-    labels = _bin_names(edges, step=int(name == "points"))
     with mpl.rc_context(STYLE):
         figure, axes = _figure(4.0)
         for series, (row, curve) in enumerate(found.items()):
-            _curve(axes, row, curve, series)
-        axes.set_xticks(range(len(labels)), labels)
-        axes.set_xlabel("points of the instance" if name == "points" else "distance of the modal centre, m")
+            _curve(axes, row, curve, series, 0.08 * (series - (len(found) - 1) / 2))
+        axes.set_xticks(range(len(bins.labels)), bins.labels)
+        axes.set_xlabel(bins.axis)
         axes.set_ylabel("PQ, %")
         axes.set_ylim(0, 100)
         axes.grid(axis="y", alpha=0.2, color=INK)
         axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
-        meaning = f"{title}: all things together, in bins; bands are 95 % intervals. {_official(name)}"
-        return Plot(name, title, meaning, _svg(figure, name))
+        meaning = f"{bins.title}: all things together, in bins; lines through points are 95 % intervals. {bins.meaning}"
+        return Plot(bins.name, bins.title, meaning, _svg(figure, bins.name))
 
 
-def _official(name: str) -> str:
-    if name == "distance":
-        return "Segments count as officially."
-    return "Those too small for the official figure count here, too."
-
-
-def _curve(axes: Axes, row: str, cells: Sequence[Interval], series: int) -> None:
+def _curve(axes: Axes, row: str, cells: Sequence[Interval], series: int, shift: float) -> None:
     colour, mark = COLOURS[series % len(COLOURS)], MARKS[series % len(MARKS)]
     low, high = (
         [100 * (cell.value if bound is None else bound) for cell, bound in zip(cells, bounds, strict=True)]
         for bounds in ([cell.low for cell in cells], [cell.high for cell in cells])
     )
-    axes.fill_between(range(len(cells)), low, high, color=colour, alpha=0.15, linewidth=0)
-    axes.plot([100 * cell.value for cell in cells], mark + "-", color=colour, label=row, markersize=5)
-
-
-def _bin_names(edges: Sequence[float], step: int) -> list[str]:
-    """``0-10`` of a distance, ``1-14`` of whole numbers (``step`` 1), and an open end."""
-    return [*(f"{low:g}-{high - step:g}" for low, high in pairwise(edges)), f"{edges[-1]:g} on"]
+    places = [place + shift for place in range(len(cells))]
+    axes.vlines(places, low, high, color=colour, alpha=0.6, linewidth=1.5)
+    axes.plot(places, [100 * cell.value for cell in cells], mark + "-", color=colour, label=row, markersize=5)
 
 
 def _said(cells: Mapping[str, Interval | None]) -> str:

@@ -2,19 +2,23 @@
 
 A run is a folder with ``.hydra/`` (``config.yaml``, ``overrides.yaml``, ``hydra.yaml``), as Hydra leaves them, and,
 once it is finished, ``metrics.json``. What ``most.evaluate`` said of its predictions may lie in ``evaluated/NAME.json``
-beside it, where NAME is the membership that predicted (``full``, ``nearest``, ``clustering``, ...).
+beside it, where NAME is the membership that predicted (``full``, ``nearest``, ``clustering``, ...), unless the report
+itself says what predicted.
 """
 
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import yaml
+from omegaconf import OmegaConf
+from omegaconf.errors import OmegaConfBaseException
 
 from most.errors import DataError
 from most.metrics.report import read_report
-from most.reports.strategy import Strategy, strategy_of
+from most.reports.strategy import Strategy, changed, strategy_of
 from most.reports.sums import Sums, read_sums
 
 FILES = ("config.yaml", "hydra.yaml", "overrides.yaml")
@@ -33,6 +37,8 @@ class Scored:
     choices: Mapping[str, Any]
     report: Mapping[str, Any]  # what most.evaluate or the training wrote
     sums: Sums
+    stage1: str  # the folder in which its stage 1 was trained
+    told: tuple[str, ...] | None  # what prediction was told besides defaults; None where no one can know
 
 
 @dataclass
@@ -63,7 +69,8 @@ def _read(folder: Path, config: Mapping[str, Any], runs: Runs) -> None:
     hydra, overrides = (
         _yaml(folder / ".hydra" / name, kind) for name, kind in zip(FILES[1:], (dict, list), strict=True)
     )
-    choices = hydra.get("hydra", {}).get("runtime", {}).get("choices")
+    runtime = hydra.get("hydra", {}).get("runtime", {})
+    choices = runtime.get("choices")
     if not isinstance(choices, dict) or not {"extent", "membership", "dataset"} <= choices.keys():
         raise DataError(f"{folder / '.hydra/hydra.yaml'}: expected hydra.runtime.choices of most.train, found none")
     try:
@@ -73,13 +80,14 @@ def _read(folder: Path, config: Mapping[str, Any], runs: Runs) -> None:
         raise DataError(
             f"{folder / '.hydra/config.yaml'}: expected a configuration of most.train, found none ({error!r})"
         ) from error
-    found = 0
+    found, stage1 = 0, _stage1(config, runtime, folder)
     for report, path, membership, section, source in _reports(folder, config, strategy.membership):
         if (sums := report[section].get("sums")) is None:
             runs.left_out[path] = "has no sums of sequences: written by an earlier version"
             continue
         way = replace(strategy, membership=membership)
-        runs.scored.append(Scored(folder, source, seed, way, config, choices, report, read_sums(sums, f"{path}")))
+        sums, told = read_sums(sums, f"{path}"), _told(report) if source == EVALUATED else ()
+        runs.scored.append(Scored(folder, source, seed, way, config, choices, report, sums, stage1, told))
         found += 1
     if not found and not any(folder in path.parents for path in runs.left_out):
         runs.left_out[folder] = _unfinished(folder, config)
@@ -90,8 +98,8 @@ def _reports(
 ) -> Iterator[tuple[Mapping[str, Any], Path, str, str, str]]:
     """Yield reports with their place, the membership scored, its section, and whence they are."""
     for path in sorted((folder / "evaluated").glob("*.json")):
-        name = membership if membership.split(" ")[0] == path.stem else path.stem
-        yield read_report(path), path, name, "panoptic", EVALUATED
+        report = read_report(path)
+        yield report, path, _predicted_by(report, path.stem, membership), "panoptic", EVALUATED
     path = folder / "metrics.json"
     if not path.is_file():
         return
@@ -101,6 +109,37 @@ def _reports(
     elif isinstance(report.get("panoptic_nearest"), dict):  # else stage 1 wrote it, and stage 2 is not finished
         yield report, path, membership, "panoptic", VALIDATED
         yield report, path, "nearest", "panoptic_nearest", BESIDE
+
+
+def _predicted_by(report: Mapping[str, Any], name: str, trained: str) -> str:
+    """Name the membership that made evaluated predictions: as they say, else by the report's own ``name``."""
+    told = _told(report)
+    if told is None:
+        return trained if trained.split(" ")[0] == name else name
+    said = str(report["prediction"]["membership"])
+    return trained if said == "trained" else said + changed("membership", told)
+
+
+def _told(report: Mapping[str, Any]) -> tuple[str, ...] | None:
+    """Return what prediction was told besides defaults; None for a report that does not say."""
+    prediction = report.get("prediction")
+    return tuple(map(str, prediction["changed"])) if isinstance(prediction, Mapping) else None
+
+
+def _stage1(config: Mapping[str, Any], runtime: Mapping[str, Any], folder: Path) -> str:
+    """Return where stage 1 was trained, as it was called then: it, and folders that stand on it, may be moved."""
+    if config.get("stage1") is None:
+        return str(runtime.get("output_dir", folder))
+    path = Path(os.path.normpath(Path(runtime.get("cwd", "")) / _resolved(config, "stage1")))
+    return str(path.parents[1] if path.suffix == ".ckpt" and path.parent.name == "checkpoints" else path)
+
+
+def _resolved(config: Mapping[str, Any], key: str) -> str:
+    """Return a setting with what it refers to, as ``${seed}``; what cannot be found out stays as it was told."""
+    try:
+        return str(OmegaConf.create(dict(config))[key])
+    except OmegaConfBaseException:
+        return str(config[key])
 
 
 def _unfinished(folder: Path, config: Mapping[str, Any]) -> str:

@@ -35,7 +35,9 @@ class Strategy:
     @property
     def detection(self) -> str:
         """What Table I tells apart: all but the membership."""
-        first = self.extent + _parted(self.heads)[1] if self.has_centres else self.heads
+        first = (
+            self.extent + _parted(self.heads)[1] if self.has_centres else "+".join((self.heads, *self.extent.split()))
+        )
         return first + ("+separate" if self.separate else "")
 
     @property
@@ -45,7 +47,8 @@ class Strategy:
         heads, changed_heads = _parted(self.heads)
         apart = (", w/o sharing" if self.separate else "") + changed_heads
         if not self.has_centres:
-            return ("Offset reg. (DS-Net)" if heads == "offset_regression" else heads) + apart
+            middles = ", to the boxes' middles" if extent == "amodal" else ""
+            return ("Offset reg. (DS-Net)" if heads == "offset_regression" else heads) + middles + apart
         if extent == "amodal":
             return f"Amodal Det.{changed}{apart}"
         if extent == "shrink_wrap" and not self.separate:  # told apart in the paper
@@ -69,8 +72,13 @@ class Strategy:
 
 
 def strategy_of(config: Mapping[str, Any], choices: Mapping[str, Any], overrides: list[str]) -> Strategy:
-    """Name a run's strategy by the choices and overrides that Hydra wrote down."""
-    named = {group: str(choices.get(group, PAPER)) + _changed(group, overrides) for group in AXES}
+    """Name a run's strategy by the choices and overrides that Hydra wrote down.
+
+    Heads that detect no centres use no extent, but for where a box has its middle.
+    """
+    named = {group: str(choices.get(group, PAPER)) + changed(group, overrides) for group in AXES}
+    if _parted(named["heads"])[0] != PAPER:
+        named["extent"] = "amodal" if choices["extent"] == "amodal" else ""
     if "membership" not in config["stage"]["run"] and choices["membership"] not in UNTRAINED:
         named["membership"] = "nearest" if _parted(named["heads"])[0] == PAPER else "mean_shift"  # stage 1's stand-in
     return Strategy(separate=bool(config["backbone"].get("separate", False)), **named)
@@ -92,8 +100,8 @@ def plain_names(strategies: Sequence[Strategy]) -> tuple[list[str], dict[Strateg
     return list(said), names
 
 
-def _changed(group: str, overrides: list[str]) -> str:
-    """The settings of a group that the command line changed, as `` (margin=2)``."""
+def changed(group: str, overrides: Sequence[str]) -> str:
+    """Return the settings of a group that the command line changed, as `` (margin=2)``."""
     changes = sorted(
         text.lstrip("+~")[len(group) + 1 :] for text in overrides if text.lstrip("+~").startswith(f"{group}.")
     )

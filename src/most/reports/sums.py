@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from most.errors import DataError
+from most.metrics.sightings import VISIBLE
 
 SEGMENTS = ("tp", "fp", "fn", "iou")
 POINTS = ("intersection", "predicted", "true")
@@ -36,7 +37,10 @@ class Sums:
     membership: Float64[np.ndarray, "sequences 4"] | None
     distance: Float64[np.ndarray, "sequences 4 bins"] | None  # SEGMENTS of all things together
     points: Float64[np.ndarray, "sequences 4 sizes"]
+    visible: Float64[np.ndarray, "sequences 4 shares"] | None  # None, too, where bins are another version's
     tracks: Float64[np.ndarray, "sequences 2 classes"] | None
+    switches: Float64[np.ndarray, "sequences classes"] | None
+    tq: Float64[np.ndarray, "sequences 2"] | None  # sum over tracks, and their number
 
 
 def read_sums(section: Any, where: str) -> Sums:
@@ -51,7 +55,8 @@ def read_sums(section: Any, where: str) -> Sums:
             distance_edges=tuple(map(float, section["distance_edges"])),
             points_edges=tuple(map(float, section["points_edges"])),
         )
-        return _arrays(measured, list(section["sequences"].values()))
+        seen = section.get("visible_edges") == list(VISIBLE)
+        return _arrays(measured, list(section["sequences"].values()), seen)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise DataError(
             f"{where}: expected the sums of held-out sequences as this version writes them, found others "
@@ -59,7 +64,7 @@ def read_sums(section: Any, where: str) -> Sums:
         ) from error
 
 
-def _arrays(measured: Measured, sequences: list[Mapping[str, Any]]) -> Sums:
+def _arrays(measured: Measured, sequences: list[Mapping[str, Any]], seen: bool) -> Sums:
     if not sequences:
         raise ValueError("no sequence")
     size, things = len(measured.classes), list(measured.things)
@@ -73,14 +78,21 @@ def _arrays(measured: Measured, sequences: list[Mapping[str, Any]]) -> Sums:
         rows = [[each[key][name] for name in SEGMENTS] for each in sequences]
         return _shaped(rows, (len(sequences), len(SEGMENTS), bins, size))[..., things].sum(-1)
 
-    known = all(each["membership"] is not None for each in sequences)
+    def optional(key: str, columns: int) -> Any:
+        if any(each.get(key) is None for each in sequences):
+            return None
+        return _shaped([each[key] for each in sequences], (len(sequences), columns))
+
     return Sums(
         measured=measured,
         counts=table(SEGMENTS + POINTS),
-        membership=_shaped([each["membership"] for each in sequences], (len(sequences), 4)) if known else None,
+        membership=optional("membership", 4),
         distance=binned("distance", len(measured.distance_edges)),
         points=binned("points", len(measured.points_edges)),
+        visible=binned("visible", len(VISIBLE)) if seen else None,
         tracks=table(TRACKS) if all("assoc" in each for each in sequences) else None,
+        switches=optional("switches", size),
+        tq=optional("tq", 2),
     )
 
 

@@ -14,7 +14,12 @@ class Row:
 
     title: str
     cells: Cells
-    seeds: tuple[int, ...] = ()  # of ours
+    parts: Sequence[Sequence[int]] = ()  # seeds of ours, those that stand on one stage 1 together
+
+    @property
+    def seeds(self) -> list[int]:
+        """All of them."""
+        return sorted(seed for part in self.parts for seed in part)
 
 
 @dataclass(frozen=True)
@@ -36,6 +41,7 @@ class Table:
     blocks: tuple[Block, ...]
     notes: tuple[str, ...] = ()
     signed: bool = False  # differences, which show + and -
+    papers: frozenset[str] = frozenset()  # columns that hold the paper's own figures, beside ours
     words: dict[str, str] = field(default_factory=dict)  # by row: what is said behind its figures
 
     def rows(self) -> Iterator[tuple[Block, Row]]:
@@ -58,6 +64,8 @@ def between(cell: Interval | None, signed: bool = False) -> str:
     return f"{100 * cell.low:{sign}.1f} to {100 * cell.high:{sign}.1f}"
 
 
-def numbers(seeds: Sequence[int]) -> str:
-    """Seeds in words."""
-    return f"seed{'s' if len(seeds) > 1 else ''} {', '.join(map(str, seeds))}" if seeds else ""
+def seeds(row: Row) -> str:
+    """Seeds in words, and on how few trainings of stage 1 they stand."""
+    few = len(row.parts)
+    on = f" on {'one stage' if few == 1 else f'{few} stages'} 1" if few < len(row.seeds) else ""
+    return ", ".join(map(str, row.seeds)) + on

@@ -9,16 +9,17 @@ from most.reports.ablations import Ablation, amodalization, memberships
 from most.reports.analysis import Analysis
 from most.reports.formats import comma_separated, latex, markdown
 from most.reports.groups import Group, group
+from most.reports.notes import remarks
 from most.reports.orders import order_table
 from most.reports.page import Chapter, page
 from most.reports.plots import INK, plots
 from most.reports.runs import Runs, find_runs
-from most.reports.tables import ablation_table, benchmark_tables, difference_table
+from most.reports.tables import ablation_table, benchmark_tables, difference_table, occlusion_tables
 
 METHOD = (
     "Means over seeds in percent; below them what 95 % of all draws lie between, of seeds first and held-out sequences "
-    "then, the same draws for all rows. Italic rows on tinted ground are the paper's, on other data: they are there to "
-    "compare orders, not figures."
+    "then, the same draws for all rows. What is said to be the paper's (italic, on tinted ground) was measured on "
+    "other data: it is there to compare orders, not figures."
 )
 
 
@@ -46,8 +47,10 @@ def _chapters(groups: Sequence[Group], baseline: str | None, draws: int, seed: i
         tables = [order_table(parts, analysis)]
         for part in parts.values():
             tables += [ablation_table(part, analysis), difference_table(part, analysis, baseline)]
+        tables += occlusion_tables(parts["table1"], analysis, baseline)
         known = [table for table in tables if table is not None]
-        chapters.append(Chapter(each.title, known, plots(parts, analysis), benchmark_tables(analysis)))
+        drawn, benchmarks = plots(parts, analysis), benchmark_tables(analysis)
+        chapters.append(Chapter(each.title, [*remarks(each)], known, drawn, benchmarks))
     return chapters
 
 
@@ -64,10 +67,11 @@ def _files(chapters: Sequence[Chapter], left_out: Mapping[str, str], summary: st
     text, tex = [f"# {title}\n\n{summary} {METHOD}\n"], []
     for number, chapter in enumerate(chapters, start=1):
         before = "" if number == 1 else f"{number}_"
-        text += [f"## {chapter.title}\n", *map(markdown, chapter.ablations)]
+        text += [f"## {chapter.title}\n", *(f"{remark}\n" for remark in chapter.remarks)]
+        text += map(markdown, chapter.ablations)
         text += [f"![{plot.title}](plots/{before}{plot.name}.svg)\n\n{plot.meaning}\n" for plot in chapter.plots]
         text += map(markdown, chapter.benchmarks)
-        tex += [f"% {chapter.title}", *map(latex, chapter.tables)]
+        tex += [*(f"% {line}" for line in (chapter.title, *chapter.remarks)), *map(latex, chapter.tables)]
         files |= {f"tables/{before}{table.name}.csv": comma_separated(table) for table in chapter.tables}
         files |= {f"plots/{before}{plot.name}.svg": plot.svg.replace(INK, "#222") for plot in chapter.plots}
     if left_out:

@@ -1,0 +1,19 @@
+"""Which runs are independent trainings: those of one stage 1 are not, whatever seeds their stages 2 have."""
+
+from collections.abc import Mapping
+
+from most.reports.runs import Scored
+
+BySeed = Mapping[int, Scored]  # a strategy's runs
+
+
+def units(*rows: BySeed) -> list[list[int]]:
+    """Part the seeds that all ``rows`` have: those that stand on one stage 1 in any of them are drawn together."""
+    seeds = sorted(set.intersection(*(set(row) for row in rows)))
+    parts = [{seed} for seed in seeds]
+    for row in rows:
+        for stage1 in {row[seed].stage1 for seed in seeds}:
+            sharing = {seed for seed in seeds if row[seed].stage1 == stage1}
+            apart = [part for part in parts if not part & sharing]
+            parts = [*apart, set().union(*(part for part in parts if part & sharing))]
+    return sorted(sorted(part) for part in parts)
