@@ -69,6 +69,15 @@ def test_a_membership_of_one_half_is_none():
     assert fused.panoptic.ids.tolist() == [0]
 
 
+def test_in_several_regions_the_most_confident_has_a_point_however_low_its_confidence_unless_it_is_none():
+    found = detections([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [1, 1])
+    unsure, surely_not = Rated({(0, 0): 0.1, (0, 1): 0.2}), Rated({(0, 0): 0.0, (0, 1): 0.0})
+    point = [[0.5, 0.0, 0.0]]
+    assert label(point, [1], found, unsure).claimed.tolist() == [1]
+    assert label(point, [1], found, unsure, overlap="order").claimed.tolist() == [-1]  # Algorithm 1, line 10
+    assert label(point, [1], found, surely_not).claimed.tolist() == [-1]
+
+
 def test_unclaimed_points_go_to_a_near_centre_then_to_clusters():
     found = detections([[0.0, 0.0, 0.0]], [1])
     points = [[1.2, 0.0, 0.0], [9.0, 0.0, 0.0], [9.2, 0.0, 0.0], [20.0, 0.0, 0.0], [1.2, 0.0, 0.0]]

@@ -24,10 +24,16 @@ class Rating:
 
         A detection's points keep their predicted class, which is the detection's own: points of another class are never
         its members (Algorithm 1, line 7, prints this the wrong way round).
+
+        Whether it belongs to a centre is the question for a point in one region; in several it is to which of them, and
+        the most confident has it however low its confidence, unless that is 0.
         """
         pairs = roi.pairs(evidence.points, evidence.semantics, evidence.detections)
         confidence = self(evidence, pairs)
         members = confidence > MEMBER
+        if overlap == "confident":
+            regions = torch.bincount(pairs.points, minlength=len(evidence.points))
+            members |= (regions[pairs.points] > 1) & (confidence > 0)
         rank = confidence if overlap == "confident" else -pairs.detections.to(confidence.dtype)
         return Claims(evidence.detections, best(len(evidence.points), pairs.select(members), rank[members]))
 
