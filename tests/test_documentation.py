@@ -30,13 +30,16 @@ TARGETS = sorted({code for page in PAGES for code in _code(page) if code.startsw
 
 
 def _jobs(overrides: list[str]) -> Iterator[list[str]]:
-    """The overrides of each job: of the one, or of all that a sweep has."""
+    """The overrides of the first job that a sweep has, or of the only one, and of those that differ in one from it."""
     values = []
     for override in OverridesParser.create().parse_overrides(overrides):
         swept = override.is_sweep_override()
         key, line = override.get_key_element(), str(override.input_line)
         values.append([f"{key}={value}" for value in override.sweep_string_iterator()] if swept else [line])
-    return map(list, itertools.product(*values))
+    first = [each[0] for each in values]
+    yield first
+    for place, each in enumerate(values):
+        yield from ([*first[:place], other, *first[place + 1 :]] for other in each[1:])
 
 
 @pytest.fixture(autouse=True, scope="module")
