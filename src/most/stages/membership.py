@@ -30,7 +30,7 @@ from most.structures import Sample
 
 
 class MembershipStage(Stage):
-    """Trains on exactly the pairs that inference sees; no weight or running statistic of stage 1 changes."""
+    """Trains on the pairs that inference sees and the truth answers; no weight or statistic of stage 1 changes."""
 
     name, prefix = "membership", "membership/"
     followed: Tensor
