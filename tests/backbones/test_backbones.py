@@ -1,14 +1,24 @@
 """What holds for every backbone."""
 
+import math
+from functools import partial
+
 import pytest
 import torch
 
 from most.backbones import AsymmetricUNetSettings, AsymmetricUNetSmallSettings, ResidualUNetSettings, UNetSettings
+from most.backbones.shortcut import Shortcut
 from most.errors import ConfigError
 from most.sparse import Sites, SparseTensor
 
 SHAPE = (20, 24, 18)
-SETTINGS = [AsymmetricUNetSettings, ResidualUNetSettings, AsymmetricUNetSmallSettings]
+SETTINGS = [
+    AsymmetricUNetSettings,
+    ResidualUNetSettings,
+    AsymmetricUNetSmallSettings,
+    partial(AsymmetricUNetSettings, shortcut=True),
+    partial(AsymmetricUNetSmallSettings, shortcut=True),
+]
 
 
 def voxels(batch_size: int = 2, density: float = 0.05) -> SparseTensor:
@@ -82,3 +92,16 @@ def test_evaluation_repeats_itself_and_training_moves_the_statistics() -> None:
     assert not torch.equal(before, backbone.stem.x_first[0].norm.running_mean)
     backbone.eval()
     assert torch.equal(backbone(voxels()).voxels, backbone(voxels()).voxels)
+
+
+def test_a_shortcut_adds_what_a_layer_makes_of_the_mean_and_the_number_of_the_inputs() -> None:
+    """Two voxels below cell (1, 0, 0) of the bottleneck, one below (0, 0, 1), none below (0, 0, 0)."""
+    fine = Sites(torch.tensor([[0, 0, 0, 8], [0, 8, 0, 7], [0, 15, 7, 0]]), (16, 8, 16), 1)
+    coarse = Sites(torch.tensor([[0, 0, 0, 0], [0, 0, 0, 1], [0, 1, 0, 0]]), (2, 1, 2), 1)
+    shortcut = Shortcut(1, 2).eval()
+    with torch.no_grad():
+        shortcut.linear.weight.copy_(torch.tensor([[1.0, 0.0], [0.0, 1.0]]))
+    bottleneck = SparseTensor(torch.full((3, 2), 10.0), coarse)
+    out = shortcut(bottleneck, SparseTensor(torch.tensor([[7.0], [2.0], [4.0]]), fine), stride=8)
+    expected = torch.tensor([[10.0, 10.0], [17.0, 10.0], [13.0, 10.0 + math.log(2)]])
+    torch.testing.assert_close(out.features, expected, rtol=1e-5, atol=1e-4)

@@ -71,3 +71,11 @@ def test_what_cannot_be_is_refused() -> None:
         sites.submanifold((3, 2, 3))
     with pytest.raises(ValueError, match="width of 2 or 3"):
         sites.strided(4)
+
+
+def test_rows_of_cells_in_any_order() -> None:
+    coordinates = torch.tensor([[1, 0, 0, 0], [0, 6, 5, 4], [0, 2, 3, 1]])
+    asked = torch.tensor([2, 0, 1, 2])
+    for order in ([0, 1, 2], [2, 1, 0]):  # the second is that of the keys
+        sites = Sites(coordinates[order], SHAPE, 2)
+        assert sites.rows(sites.coordinates[asked]).equal(asked)

@@ -7,6 +7,7 @@ from torch import nn
 from most.backbones.bev import BevBranch
 from most.backbones.blocks import Down, Up
 from most.backbones.contract import Backbone, BackboneFeatures
+from most.backbones.shortcut import Shortcut
 from most.sparse import SparseTensor
 
 
@@ -22,6 +23,7 @@ class UNet(Backbone):
         bottleneck_height: int,
         bev_channels: int,
         bev_squeeze: bool,
+        shortcut: bool,
         decoder: bool,
     ) -> None:
         super().__init__()
@@ -30,6 +32,7 @@ class UNet(Backbone):
         steps = list(itertools.pairwise(widths))
         self.stem = block(in_channels, widths[0])
         self.down = nn.ModuleList(Down(fine, coarse, down_kernel, block) for fine, coarse in steps)
+        self.shortcut = Shortcut(in_channels, widths[-1]) if shortcut else None
         self.bev = BevBranch(widths[-1], bottleneck_height, bev_channels, bev_squeeze, back=decoder)
         ups = reversed(steps) if decoder else ()
         self.up = nn.ModuleList(Up(coarse, fine, down_kernel, block) for fine, coarse in ups)
@@ -39,7 +42,10 @@ class UNet(Backbone):
         levels = [self.stem(x)]
         for down in self.down:
             levels.append(down(levels[-1]))
-        y, bev = self.bev(levels.pop())
+        bottleneck = levels.pop()
+        if self.shortcut is not None:
+            bottleneck = self.shortcut(bottleneck, x, self.bev_stride)
+        y, bev = self.bev(bottleneck)
         for up in self.up:
             y = up(y, levels.pop())
         return BackboneFeatures(voxels=y.features if self.up else x.features[:, :0], bev=bev)

@@ -46,6 +46,11 @@ class Sites:
     def __len__(self) -> int:
         return len(self.coordinates)
 
+    def rows(self, coordinates: Int64[Tensor, "cells 4"]) -> Int64[Tensor, "cells"]:
+        """Return the row of each of these cells (batch, x, y, z), all of which are occupied."""
+        place = torch.searchsorted(self._keys, keys_of(coordinates, self.shape))
+        return place if self.order is None else self.order[place]
+
     def submanifold(self, kernel: tuple[int, int, int]) -> KernelMap:
         """Return the map of a convolution whose outputs are these sites themselves; each width is 1 or 3."""
         if kernel not in self._submanifold:
