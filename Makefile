@@ -5,6 +5,7 @@ VENV ?= .venv
 DEVKIT ?= .devkit
 DEMO ?= demo
 VELOCITY ?= velocity
+TRAFFIC ?= traffic
 ABLATION ?= ablation
 SIZE ?= small
 RUN = $(VENV)/bin/python
@@ -46,20 +47,22 @@ demo: setup
 	$(RUN) -m most.compare 'reports={nearest: $(DEMO)/nearest.json, full: $(DEMO)/metrics.json}'
 	@echo "tables: above, in $(DEMO)/metrics.json and $(DEMO)/nearest.json; picture: $(DEMO)/sweep.png"
 
-TRAFFIC = dataset=traffic dataset.root=$(VELOCITY)/traffic dataset.tables=$(VELOCITY)/tables
-LEARNED = $(VELOCITY)/run/checkpoints/detection-last.ckpt
+FOLLOWED = $(VELOCITY)/$(TRAFFIC)
+STREAM = dataset=$(TRAFFIC) dataset.root=$(FOLLOWED)/scans dataset.tables=$(FOLLOWED)/tables
+LEARNED = $(FOLLOWED)/run/checkpoints/detection-last.ckpt
 
-# Do predicted velocities help to track at 2 Hz? What is finished is skipped, so that an interrupted run goes on.
+# Do predicted velocities help to track at 2 Hz? TRAFFIC=traffic_10hz: at every fifth of ten scans a second.
+# What is finished is skipped, so that an interrupted run goes on.
 velocity: setup
-	$(RUN) -m most.simulate simulation=traffic out=$(VELOCITY)/traffic
-	test -f $(VELOCITY)/run/metrics.json || $(RUN) -m most.train +experiment=sim_velocity $(TRAFFIC) \
-	  hydra.run.dir=$(VELOCITY)/run $$(test ! -f $(LEARNED) || echo resume=$(LEARNED))
-	$(RUN) -m most.predict checkpoint=$(LEARNED) split=test out=$(VELOCITY)/predictions $(TRAFFIC)
+	$(RUN) -m most.simulate simulation=$(TRAFFIC) out=$(FOLLOWED)/scans
+	test -f $(FOLLOWED)/run/metrics.json || $(RUN) -m most.train +experiment=sim_velocity $(STREAM) \
+	  hydra.run.dir=$(FOLLOWED)/run $$(test ! -f $(LEARNED) || echo resume=$(LEARNED))
+	$(RUN) -m most.predict checkpoint=$(LEARNED) split=test out=$(FOLLOWED)/predictions $(STREAM)
 	for motion in velocity nearest; do \
-	  $(RUN) -m most.track predictions=$(VELOCITY)/predictions split=test out=$(VELOCITY)/$$motion \
-	    tracker.motion=$$motion $(TRAFFIC) || exit; done
-	$(RUN) -m most.velocity velocity=$(VELOCITY)/velocity nearest=$(VELOCITY)/nearest split=test \
-	  out=$(VELOCITY)/velocity.json $(TRAFFIC)
+	  $(RUN) -m most.track predictions=$(FOLLOWED)/predictions split=test out=$(FOLLOWED)/$$motion \
+	    tracker.motion=$$motion $(STREAM) || exit; done
+	$(RUN) -m most.velocity velocity=$(FOLLOWED)/velocity nearest=$(FOLLOWED)/nearest split=test \
+	  out=$(FOLLOWED)/velocity.json $(STREAM)
 
 # Rows of Tables I and II. The paper's Table II stands on shrink-wrapped extents: its last row is the first one's of
 # Table I, nearest centres are scored beside each run, and clustering is put on the same stage 1.
