@@ -48,21 +48,22 @@ demo: setup
 	@echo "tables: above, in $(DEMO)/metrics.json and $(DEMO)/nearest.json; picture: $(DEMO)/sweep.png"
 
 FOLLOWED = $(VELOCITY)/$(TRAFFIC)
-STREAM = dataset=$(TRAFFIC) dataset.root=$(FOLLOWED)/scans dataset.tables=$(FOLLOWED)/tables
+SCANS = dataset=$(TRAFFIC) dataset.root=$(FOLLOWED)/scans dataset.tables=$(FOLLOWED)/tables
 LEARNED = $(FOLLOWED)/run/checkpoints/detection-last.ckpt
 
 # Do predicted velocities help to track at 2 Hz? TRAFFIC=traffic_10hz: at every fifth of ten scans a second.
 # What is finished is skipped, so that an interrupted run goes on.
 velocity: setup
+	$(if $(filter traffic traffic_10hz,$(TRAFFIC)),,$(error TRAFFIC: expected traffic or traffic_10hz, found $(TRAFFIC)))
 	$(RUN) -m most.simulate simulation=$(TRAFFIC) out=$(FOLLOWED)/scans
-	test -f $(FOLLOWED)/run/metrics.json || $(RUN) -m most.train +experiment=sim_velocity $(STREAM) \
+	test -f $(FOLLOWED)/run/metrics.json || $(RUN) -m most.train +experiment=sim_velocity $(SCANS) \
 	  hydra.run.dir=$(FOLLOWED)/run $$(test ! -f $(LEARNED) || echo resume=$(LEARNED))
-	$(RUN) -m most.predict checkpoint=$(LEARNED) split=test out=$(FOLLOWED)/predictions $(STREAM)
+	$(RUN) -m most.predict checkpoint=$(LEARNED) split=test out=$(FOLLOWED)/predictions $(SCANS)
 	for motion in velocity nearest; do \
 	  $(RUN) -m most.track predictions=$(FOLLOWED)/predictions split=test out=$(FOLLOWED)/$$motion \
-	    tracker.motion=$$motion $(STREAM) || exit; done
+	    tracker.motion=$$motion $(SCANS) || exit; done
 	$(RUN) -m most.velocity velocity=$(FOLLOWED)/velocity nearest=$(FOLLOWED)/nearest split=test \
-	  out=$(FOLLOWED)/velocity.json $(STREAM)
+	  out=$(FOLLOWED)/velocity.json $(SCANS)
 
 # Rows of Tables I and II. The paper's Table II stands on shrink-wrapped extents: its last row is the first one's of
 # Table I, nearest centres are scored beside each run, and clustering is put on the same stage 1.
@@ -76,7 +77,7 @@ DATASET_full = ablation
 SEEDS_small = 1
 SEEDS_full = 1,2,3,4,5
 FEWER_SEEDS_small = 1
-FEWER_SEEDS_full = 1,2,3# of the rows that the paper's claims do not rest on
+FEWER_SEEDS_full = 1,2,3# of all rows but shrink_wrap, track_max and the memberships
 ALONE_small = hydra.launcher.n_jobs=1# a seed is one job, and gets all cores
 SWEPT = $(ABLATION)/$(SIZE)
 SWEEP = $(RUN) -m most.train -m +experiment=$(EXPERIMENT_$(SIZE)) hydra.sweep.dir=$(SWEPT) \

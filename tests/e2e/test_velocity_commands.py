@@ -4,13 +4,17 @@ import json
 from pathlib import Path
 
 import pytest
+
 from commands import TINY, most
 
 
 @pytest.mark.parametrize(
     ("traffic", "names", "key_frames"),
-    [("traffic", ["scene-0001", "scene-0002", "scene-0003", "scene-0012"], 2), ("traffic_10hz", ["00", "01", "02", "03"], 3)],
-)  # fmt: skip
+    [
+        ("traffic", ["scene-0001", "scene-0002", "scene-0003", "scene-0012"], 2),
+        ("traffic_10hz", ["00", "01", "02", "03"], 3),
+    ],
+)
 def test_from_traffic_to_the_table(tmp_path: Path, traffic: str, names: list[str], key_frames: int) -> None:
     train, val, *test = (f"'{name}'" for name in names)
     tree = [f"dataset={traffic}", "dataset.root=scans", "dataset.tables=tables", "dataset.workers=0",

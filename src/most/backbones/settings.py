@@ -19,7 +19,7 @@ class UNetSettings:
     down_kernel: int = 3  # 3: overlapping windows, the occupied part grows; 2: tiles, half the cost
     bev_channels: int = 128
     bev_squeeze: bool = False  # squeeze columns to bev_channels, sparsely, before the dense convolutions
-    shortcut: bool = False  # from the inputs to the bottleneck, past the encoder; not the paper's
+    shortcut: bool = False  # from the input voxels to the bottleneck, past the halvings; not the paper's
     separate: bool = False  # a network of its own, encoder and all, for detection ("w/o sharing", Table I)
 
     def __post_init__(self) -> None:

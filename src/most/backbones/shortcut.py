@@ -1,4 +1,4 @@
-"""From the network's inputs to the bottleneck of its U-Net, past the encoder."""
+"""From the voxels that enter a U-Net to its bottleneck, past the halvings."""
 
 import torch
 from torch import Tensor, nn
@@ -8,20 +8,20 @@ from most.sparse import SparseTensor
 
 
 class Shortcut(nn.Module):
-    """Adds to each voxel of the bottleneck what a layer makes of the mean of the inputs in it, and of their number.
+    """Adds to each voxel of the bottleneck what a layer makes of the mean and the number of the input voxels in it.
 
-    Every halving keeps what its own loss asks for. The age of points means nothing to the classes that most of the loss
-    is of, and hardly reaches the bottleneck otherwise; which end of a moving object's trace is now hangs on it alone.
+    In a short training the ages of points hardly get through the halvings, yet they alone tell which end of a moving
+    object's trace is the present one.
     """
 
     def __init__(self, in_channels: int, channels: int) -> None:
-        """``in_channels`` of the inputs, ``channels`` of the bottleneck."""
+        """``in_channels`` of the input voxels, ``channels`` of the bottleneck's."""
         super().__init__()
         self.linear = nn.Linear(in_channels + 1, channels, bias=False)
         self.norm = NormReLU(channels)
 
     def forward(self, bottleneck: SparseTensor, inputs: SparseTensor, stride: int) -> SparseTensor:
-        """Add; each voxel of the bottleneck is ``stride`` voxels of the inputs wide, and none of these lies outside."""
+        """Add; the bottleneck's voxels are ``stride`` input voxels wide, and each of these lies in an occupied one."""
         batch, cells = inputs.sites.coordinates.split([1, 3], 1)
         row = bottleneck.sites.rows(torch.cat([batch, cells // stride], 1))
         count = torch.bincount(row, minlength=len(bottleneck.sites)).to(inputs.features.dtype)[:, None]
