@@ -49,6 +49,7 @@ demo: setup
 
 FOLLOWED = $(VELOCITY)/$(TRAFFIC)
 SCANS = dataset=$(TRAFFIC) dataset.root=$(FOLLOWED)/scans dataset.tables=$(FOLLOWED)/tables
+OPTIONS_traffic_10hz = dataset.sweeps=5 stage.detection.epochs=6 trainer.validate_every=6# half a second as well
 LEARNED = $(FOLLOWED)/run/checkpoints/detection-last.ckpt
 
 # Do predicted velocities help to track at 2 Hz? TRAFFIC=traffic_10hz: at every fifth of ten scans a second.
@@ -56,7 +57,7 @@ LEARNED = $(FOLLOWED)/run/checkpoints/detection-last.ckpt
 velocity: setup
 	$(if $(filter traffic traffic_10hz,$(TRAFFIC)),,$(error TRAFFIC: expected traffic or traffic_10hz, found $(TRAFFIC)))
 	$(RUN) -m most.simulate simulation=$(TRAFFIC) out=$(FOLLOWED)/scans
-	test -f $(FOLLOWED)/run/metrics.json || $(RUN) -m most.train +experiment=sim_velocity $(SCANS) \
+	test -f $(FOLLOWED)/run/metrics.json || $(RUN) -m most.train +experiment=sim_velocity $(SCANS) $(OPTIONS_$(TRAFFIC)) \
 	  hydra.run.dir=$(FOLLOWED)/run $$(test ! -f $(LEARNED) || echo resume=$(LEARNED))
 	$(RUN) -m most.predict checkpoint=$(LEARNED) split=test out=$(FOLLOWED)/predictions $(SCANS)
 	for motion in velocity nearest; do \
