@@ -2,7 +2,7 @@ import math
 
 import torch
 
-from most.encoder import PointEncoder, describe, voxel_mean
+from most.encoder import PointEncoder, describe
 from most.structures import Sample
 from most.voxels import Grid, voxelise
 
@@ -14,9 +14,10 @@ def window(points):
 
 
 def test_voxel_features_are_the_mean_over_its_points():
-    voxels = voxelise([window([[0.2, 0.2, 0.2, 0.0, 0.0], [0.4, 0.4, 0.4, 0.0, 0.0], [3.5, 0.5, 0.5, 0.0, 0.0]])], GRID)
-    values = torch.tensor([[1.0], [3.0], [7.0]])
-    assert voxel_mean(values, voxels).tolist() == [[2.0], [7.0]]
+    points = [[0.2, 0.2, 0.2, 0.0, 0.0], [0.4, 0.4, 0.4, 0.0, 0.0], [3.5, 0.5, 0.5, 0.0, 0.0]]
+    network = PointEncoder([8, 4]).build(GRID).eval()
+    features, of_voxels = network(torch.tensor(points), voxelise([window(points)], GRID))
+    torch.testing.assert_close(of_voxels[:, :4], torch.stack([features[:2].mean(0), features[2]]))
 
 
 def test_raw_features_of_two_points_worked_out_by_hand():

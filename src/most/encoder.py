@@ -8,6 +8,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from most.errors import ConfigError
+from most.geometry.means import group_means
 from most.normed_linear import NormedLinear
 from most.normed_pair import NormedPair
 from most.structures import Voxels
@@ -49,7 +50,7 @@ class PointMLP(nn.Module):
         """Return F_point of every point in range, and the features of every voxel."""
         described, raw = describe(points, voxels, self.grid)
         features = self.layers(described)
-        return features, torch.cat([voxel_mean(features, voxels), raw], 1)
+        return features, torch.cat([group_means(features, voxels.point_voxel, len(voxels))[0], raw], 1)
 
 
 def normed_layers(widths: list[int]) -> Iterator[nn.Module]:
@@ -63,17 +64,6 @@ def normed_layers(widths: list[int]) -> Iterator[nn.Module]:
             widths = widths[1:]
 
 
-def voxel_mean(values: Float[Tensor, "inputs channels"], voxels: Voxels) -> Float[Tensor, "voxels channels"]:
-    """Average the points' values in each voxel."""
-    sums = values.new_zeros(len(voxels), values.shape[1]).index_add(0, voxels.point_voxel, values)
-    return sums / point_counts(voxels, values.dtype)[:, None]
-
-
-def point_counts(voxels: Voxels, dtype: torch.dtype) -> Float[Tensor, "voxels"]:
-    """Return how many points each voxel holds."""
-    return torch.bincount(voxels.point_voxel, minlength=len(voxels)).to(dtype)
-
-
 def describe(
     points: Float[Tensor, "inputs 5"], voxels: Voxels, grid: Grid
 ) -> tuple[Float[Tensor, "inputs 12"], Float[Tensor, "voxels 7"]]:
@@ -81,8 +71,8 @@ def describe(
     size, reach = points.new_tensor(grid.voxel_size), points.new_tensor(grid.upper)
     middles = grid.middles(voxels.coordinates[:, 1:])
     xyz, rest = points[:, :3], torch.cat([points[:, 3:4], points[:, 4:] / MOMENT], 1)
-    means = voxel_mean(torch.cat([xyz, rest], 1), voxels)
     index = voxels.point_voxel
+    means, counts = group_means(torch.cat([xyz, rest], 1), index, len(voxels))
     described = torch.cat(
         [
             xyz / reach,
@@ -93,6 +83,6 @@ def describe(
         ],
         1,
     )
-    log_counts = point_counts(voxels, points.dtype).log()[:, None]
+    log_counts = counts.to(points.dtype).log()[:, None]
     raw = torch.cat([((means[:, :3] - middles) / size).clamp(-2, 2), means[:, 2:], log_counts], 1)
     return described, raw

@@ -42,6 +42,19 @@ def test_contract(settings: type[UNetSettings], density: float) -> None:
     assert all(b.isfinite().all() for b in backbone.buffers())
 
 
+@pytest.mark.parametrize("settings", SETTINGS)
+def test_half_precision_is_close_and_trains_whole_weights(settings: type[UNetSettings]) -> None:
+    backbone = settings(widths=[4, 6, 8, 10], bev_channels=7).build(5, SHAPE).eval()
+    exact = backbone(voxels()).bev
+    with torch.autocast("cpu", dtype=torch.bfloat16):
+        rough = backbone(voxels()).bev
+    assert 0 < (rough.float() - exact).abs().max() < 0.1 * exact.abs().max()
+    rough.float().sum().backward()
+    gradients = [p.grad for p in backbone.parameters() if p.grad is not None]
+    assert gradients
+    assert all(gradient.dtype == torch.float32 and gradient.isfinite().all() for gradient in gradients)
+
+
 @pytest.mark.parametrize(
     ("wrong", "key"),
     [

@@ -3,6 +3,7 @@
 import torch
 from torch import Tensor, nn
 
+from most.geometry.means import group_means
 from most.norm import NormReLU
 from most.sparse import SparseTensor
 
@@ -24,8 +25,7 @@ class Shortcut(nn.Module):
         """Add; the bottleneck's voxels are ``stride`` input voxels wide, and each of these lies in an occupied one."""
         batch, cells = inputs.sites.coordinates.split([1, 3], 1)
         row = bottleneck.sites.rows(torch.cat([batch, cells // stride], 1))
-        count = torch.bincount(row, minlength=len(bottleneck.sites)).to(inputs.features.dtype)[:, None]
-        sums = inputs.features.new_zeros(len(count), inputs.features.shape[1]).index_add(0, row, inputs.features)
-        count = count.clamp(min=1)  # windows that overlap reach cells without inputs
-        added: Tensor = self.norm(self.linear(torch.cat([sums / count, count.log()], 1)))
+        means, counts = group_means(inputs.features, row, len(bottleneck.sites))
+        counts = counts.clamp(min=1).to(means.dtype)  # windows that overlap reach cells without inputs
+        added: Tensor = self.norm(self.linear(torch.cat([means, counts.log()[:, None]], 1)))
         return bottleneck.with_features(bottleneck.features + added)

@@ -4,6 +4,8 @@ import torch
 from jaxtyping import Float, Float32, Int64
 from torch import Tensor
 
+from most.geometry.means import group_means
+
 SMALLEST = 0.05  # half-size of a segment of one point, m
 
 
@@ -15,8 +17,7 @@ def measure(
     Points are finite. A segment without any is put at the origin.
     """
     near = points.double()
-    sizes = torch.bincount(row, minlength=count).clamp(min=1)
-    centres = near.new_zeros(count, 3).index_add_(0, row, near) / sizes[:, None]
+    centres, _ = group_means(near, row, count)
     reach = torch.full_like(centres, SMALLEST)
     reach.scatter_reduce_(0, row[:, None].expand(-1, 3), (near - centres[row]).abs(), "amax")
     return centres.float(), reach.float()

@@ -5,6 +5,7 @@ from jaxtyping import Float, Int64
 from torch import Tensor
 
 from most.datasets.taxonomy import Taxonomy
+from most.geometry.means import group_means
 from most.structures import Instances
 
 
@@ -17,12 +18,12 @@ def find_instances(
     """The instances of one scan with their modal centres, which is all that matching takes: no extents, no motion."""
     own = taxonomy.is_thing(semantics) & (taxonomy.instance_of(labels) != 0) & points.isfinite().all(1)
     keys, owner, counts = torch.unique(labels[own], return_inverse=True, return_counts=True)
-    sums = points.new_zeros(len(keys), 3, dtype=torch.float64).index_add_(0, owner, points[own].double())
+    centres, _ = group_means(points[own].double(), owner, len(keys))
     return Instances(
         keys=keys,
         classes=torch.zeros_like(keys).index_copy_(0, owner, semantics[own]),
         counts=counts,
-        centres=(sums / counts[:, None]).float(),
+        centres=centres.float(),
         extents=points.new_zeros(len(keys), 3),
         velocities=points.new_zeros(len(keys), 2),
         velocity_known=torch.zeros_like(keys, dtype=torch.bool),

@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Bool, Float64, Int64
 from torch import Tensor
 
+from most.geometry.means import group_means
 from most.geometry.poses import yaw
 from most.modal.instances import InstanceTable, turn
 from most.modal.outline import hull, join, merge
@@ -99,7 +100,7 @@ def _measure(sweep: Sweep, labels: Int64[Tensor, "points"], rules: LabelRules) -
     is_instance &= sweep.points[:, :3].isfinite().all(1)
     points = sweep.points[is_instance, :3].double()
     keys, owners, counts = torch.unique(labels[is_instance], return_inverse=True, return_counts=True)
-    centres = points.new_zeros(len(keys), 3).index_add_(0, owners, points) / counts[:, None]
+    centres, _ = group_means(points, owners, len(keys))
     pose = sweep.pose.double()
     about = points - centres[owners]
     flat = (about[:, :2] @ turn(yaw(pose)).T).numpy()
