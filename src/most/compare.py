@@ -11,7 +11,8 @@ from omegaconf import MISSING, DictConfig
 from most.config import conf_dir, register, store_root, typed
 from most.entry import run, start
 from most.errors import ConfigError
-from most.metrics.report import format_comparison, read_report
+from most.metrics.report import read_report
+from most.reports.comparison import format_differences, format_figures
 
 
 @dataclass
@@ -32,8 +33,11 @@ store_root("compare", CompareConfig)
 
 
 def compare(config: CompareConfig) -> None:
-    """Print a line for each report."""
-    print(format_comparison({name: read_report(Path(str(path))) for name, path in config.reports.items()}))
+    """Print a line for each report, and below how much higher the others are than the first."""
+    reports = {name: read_report(Path(str(path))) for name, path in config.reports.items()}
+    print(format_figures(reports))
+    if len(reports) > 1:
+        print(f"\n{format_differences(reports)}")
 
 
 @hydra.main(version_base=None, config_path=str(conf_dir()), config_name="compare")

@@ -120,7 +120,9 @@ def test_predictions_cover_every_point_and_are_scored(run):
 
     done = most(run, "compare", "reports={nearest: nearest.json, full: scores.json}")
     assert done.returncode == 0, done.stderr
-    assert [line.split()[0] for line in done.stdout.splitlines()] == ["PQ", "nearest", "full"]
+    figures, differences = done.stdout.split("\n\n")
+    assert [line.split()[0] for line in figures.splitlines()] == ["PQ", "nearest", "full"]
+    assert differences.startswith("minus nearest")
 
     done = most(run, "draw", "predictions=predictions", "sequence='01'", "index=1", "out=sweep.png",
                 "dataset=simulated", "dataset.root=streets", *SPLITS)  # fmt: skip

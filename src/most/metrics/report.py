@@ -15,14 +15,6 @@ WIDTH = 120  # of a terminal, characters
 NUMBERS = re.compile(r"\[[-+.,\w\s]*\]")  # a list of numbers takes one line
 COLUMNS = ("pq", "sq", "rq", "iou")
 COUNTS = ("tp", "fp", "fn")
-COMPARED = {
-    "PQ": "pq",
-    "PQ present": "pq_present",
-    "PQ things": "pq_things",
-    "mIoU": "miou",
-    "membership": "membership_accuracy",
-    "contested": "membership_accuracy_contested",
-}
 
 
 def write_report(path: Path, report: Mapping[str, Any]) -> None:
@@ -84,16 +76,6 @@ def format_row(row: PaperRow, width: int = WIDTH) -> str:
         head, line = blocks[-1]
         blocks[-1] = head + f"{title:>{size}}", line + f"{_percent(figure):>{size}}"
     return "\n".join([row.title, *(text for block in blocks for text in block)])
-
-
-def format_comparison(reports: Mapping[str, Mapping[str, Any]]) -> str:
-    """The main figures of several reports in percent, a line each."""
-    width = max(map(len, reports))
-    lines = [f"{'':<{width}}" + "".join(f"  {title:>{max(len(title), 6)}}" for title in COMPARED)]
-    for name, report in reports.items():
-        figures = {title: _percent(report["panoptic"].get(key)) for title, key in COMPARED.items()}
-        lines.append(f"{name:<{width}}" + "".join(f"  {figures[title]:>{max(len(title), 6)}}" for title in COMPARED))
-    return "\n".join(lines)
 
 
 def _class_line(width: int, name: str, row: Mapping[str, float]) -> str:
