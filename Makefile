@@ -49,7 +49,7 @@ demo: setup
 
 FOLLOWED = $(VELOCITY)/$(TRAFFIC)
 SCANS = dataset=$(TRAFFIC) dataset.root=$(FOLLOWED)/scans dataset.tables=$(FOLLOWED)/tables
-OPTIONS_traffic_10hz = dataset.sweeps=5 stage.detection.epochs=6 trainer.validate_every=6# half a second as well
+OPTIONS_traffic_10hz = stage.detection.epochs=12 trainer.validate_every=12# ten sweeps are a second there, and take longer
 LEARNED = $(FOLLOWED)/run/checkpoints/detection-last.ckpt
 
 # Do predicted velocities help to track at 2 Hz? TRAFFIC=traffic_10hz: at every fifth of ten scans a second.
