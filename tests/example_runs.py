@@ -108,5 +108,6 @@ def example_sweep(folder: Path, seeds: int = 3) -> Path:
             example_run(
                 folder / "memberships" / str(seed) / membership, example_sums(0.72, 100 * seed + number), seed=seed,
                 membership=membership, nearest=example_sums(0.7, 100 * seed + number, membership=0.7),
+                stage1=f"track_max,{seed}",
             )  # fmt: skip
     return folder

@@ -34,7 +34,7 @@ store_root("compare", CompareConfig)
 
 def compare(config: CompareConfig) -> None:
     """Print a line for each report, and below how much higher the others are than the first."""
-    reports = {name: read_report(Path(str(path))) for name, path in config.reports.items()}
+    reports = {str(name): read_report(Path(str(path))) for name, path in config.reports.items()}
     print(format_figures(reports))
     if len(reports) > 1:
         print(f"\n{format_differences(reports)}")

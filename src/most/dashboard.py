@@ -16,8 +16,6 @@ from most.errors import ConfigError
 from most.files import atomic_write
 from most.viz.dashboard import describe, layout, workspace
 
-LEARNING_RATES = ("lr-AdamW", "lr-SGD")  # of sim_ablation's optimisers
-
 
 @dataclass
 class DashboardConfig:
@@ -46,7 +44,7 @@ def dashboard(config: DashboardConfig) -> None:
     """Write the layout to ``out``; where asked to, make the workspace of it."""
     taxonomy = Taxonomy.load(config.taxonomy)
     things = [taxonomy.class_names[thing] for thing in taxonomy.things]
-    sections = layout(things, config.pictures, LEARNING_RATES)
+    sections = layout(things, config.pictures)
     with atomic_write(Path(config.out), "w") as file:
         file.write(json.dumps(describe(sections), indent=2) + "\n")
     print(f"{config.out}: {sum(len(section.panels) for section in sections)} panels in {len(sections)} sections")

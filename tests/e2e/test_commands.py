@@ -41,7 +41,7 @@ def logged(run) -> OfflineRun:
 
 
 def test_the_offline_run_holds_configuration_losses_metrics_rate_and_throughput(logged):
-    for key in ("train/loss_heatmap", "train/loss_voxel", "val/pq", "val/miou", "lr-AdamW", "lr-SGD",
+    for key in ("train/loss_heatmap", "train/loss_voxel", "val/pq", "val/miou", "learning_rate", "lr-SGD",
                 "train/scans_per_second", "membership/train/loss", "membership/val/pq", "membership/val/nearest_pq",
                 "val/class_pq/car"):  # fmt: skip
         assert isinstance(logged.last[key], int | float), key

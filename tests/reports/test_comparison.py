@@ -1,5 +1,6 @@
 """Reports side by side say how sure a difference is."""
 
+import re
 from typing import Any
 
 import pytest
@@ -43,9 +44,17 @@ def test_a_difference_that_all_sequences_share_has_no_width() -> None:
 
 
 def test_intervals_are_those_of_the_drawn_sequences_and_signed_towards_the_first() -> None:
-    """Of two sequences each is drawn twice in a quarter of all draws: the interval reaches from one to the other."""
-    found = format_differences({"a": report(with_memberships(60, 80)), "b": report(with_memberships(70, 40))})
-    assert "-15.0 (-40.0 to +10.0)" in found
+    """Differences of -2, -4 and -6 points: Student's interval for three is -4 -+ 4.303 * 2 / sqrt(3)."""
+    found = format_differences({"a": report(with_memberships(60, 70, 80)), "b": report(with_memberships(58, 66, 74))})
+    (line,) = (line for line in found.splitlines() if line.startswith("membership"))
+    value, low, high = map(float, re.findall(r"[-+][\d.]+", line))
+    assert (value, low, high) == pytest.approx((-4, -4 - 4.97, -4 + 4.97), abs=0.6)
+
+
+def test_accuracies_over_other_regions_have_no_difference() -> None:
+    found = format_differences({"a": report(with_memberships(60, 80)), "b": report(with_memberships(60, 80, of=90))})
+    assert "PQ" in found
+    assert "membership" not in found
 
 
 def test_one_sequence_says_nothing_of_others() -> None:

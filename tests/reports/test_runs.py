@@ -1,6 +1,7 @@
 """Runs are found at any depth and told apart by their configuration; what cannot be counted is named."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -87,10 +88,12 @@ def test_unfinished_runs_and_those_without_sums_are_left_out_with_a_reason(tmp_p
         ("metrics.json", '{"panoptic": {"sums": {"classes": 3}}}', r"metrics\.json: expected the sums of held-out"),
     ],
 )
-def test_a_damaged_run_is_refused_by_name(tmp_path: Path, name: str, content: str, message: str) -> None:
-    (example_run(tmp_path, example_sums(0.7, 1)) / name).write_text(content)
-    with pytest.raises(DataError, match=message):
-        find_runs(tmp_path)
+def test_a_damaged_run_is_left_out_by_name(tmp_path: Path, name: str, content: str, message: str) -> None:
+    whole, damaged = (example_run(tmp_path / each, example_sums(0.7, 1)) for each in ("whole", "damaged"))
+    (damaged / name).write_text(content)
+    found = find_runs(tmp_path)
+    assert [run.folder for run in found.scored] == [whole]
+    assert re.search(message, found.left_out[damaged])
 
 
 @pytest.mark.parametrize("change", [("tp", [1]), ("iou", [-1.0] * 20), ("membership", [1, 2]), ("scans", None)])
@@ -98,8 +101,9 @@ def test_sums_of_another_shape_or_below_0_are_refused(tmp_path: Path, change: tu
     sums = example_sums(0.7, 1)
     sums["sequences"]["09"][change[0]] = change[1]
     example_run(tmp_path, sums)
-    with pytest.raises(DataError, match=r"metrics\.json: expected the sums"):
-        find_runs(tmp_path)
+    found = find_runs(tmp_path)
+    assert not found.scored
+    assert "metrics.json: expected the sums" in found.left_out[tmp_path]
 
 
 def test_a_folder_without_runs_is_refused(tmp_path: Path) -> None:
@@ -122,11 +126,16 @@ def test_other_sequences_or_settings_are_groups_of_their_own_that_say_what_tells
         example_run(tmp_path / "main" / str(number), example_sums(0.7, 1), extent=extent)
     example_run(tmp_path / "sequences", example_sums(0.7, 1, sequences=("07",)))
     example_run(tmp_path / "settings", example_sums(0.7, 1), backbone={"widths": [8, 8]})
+    example_run(tmp_path / "precision", example_sums(0.7, 1), trainer={"precision": "16-mixed"})
+    other_scans = example_sums(0.7, 1)
+    other_scans["sequences"]["09"]["true"][1] += 1
+    example_run(tmp_path / "scans", other_scans)
     first, *others = group(find_runs(tmp_path).scored)
     assert len(first.rows) == 2
     assert "backbone.widths=[4, 8]" in first.title
     assert {len(each.rows) for each in others} == {1}
-    assert sorted("1 sequence (07)" in each.title for each in others) == [False, True]
+    assert sorted("1 sequence (07)" in each.title for each in others) == [False, False, False, True]
+    assert sum("trainer.precision=16-mixed" in each.title for each in others) == 1
 
 
 def test_two_runs_that_differ_in_an_extent_that_nothing_uses_are_one(tmp_path: Path) -> None:

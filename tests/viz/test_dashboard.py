@@ -11,13 +11,13 @@ from most.viz.dashboard import describe, layout, workspace
 
 
 def test_sections_are_those_that_there_is_something_to_show_of():
-    names = [section.name for section in layout(["car"], 2, ["lr-SGD"])]
+    names = [section.name for section in layout(["car"], 2)]
     assert names == ["Losses", "Panoptic quality", "By class", "Membership", "Bird's-eye view", "Throughput"]
-    assert "Bird's-eye view" not in [section.name for section in layout(["car"], 0, [])]
+    assert "Bird's-eye view" not in [section.name for section in layout(["car"], 0)]
 
 
 def test_classes_have_curves_and_pictures_panels_in_both_stages():
-    panels = {panel.title: panel for section in layout(["car", "person"], 2, []) for panel in section.panels}
+    panels = {panel.title: panel for section in layout(["car", "person"], 2) for panel in section.panels}
     assert panels["class_pq"].keys == ["val/class_pq/car", "val/class_pq/person"]
     assert panels["membership/bev"].keys == ["membership/val/bev_1", "membership/val/bev_2"]
     assert panels["pq"].keys == ["val/pq", "membership/val/nearest_pq", "membership/val/pq"]
@@ -25,7 +25,7 @@ def test_classes_have_curves_and_pictures_panels_in_both_stages():
 
 def test_the_workspace_shows_every_key_and_groups_by_extent_and_membership():
     pytest.importorskip("wandb_workspaces")
-    sections = layout(["car"], 1, ["lr-SGD"])
+    sections = layout(["car"], 1)
     made = workspace(sections, "team", "most", "MOST")
     published = json.dumps(made._to_model().model_dump(mode="json"))
     said = describe(sections)

@@ -6,6 +6,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from jaxtyping import Int64
 from torch import Tensor
@@ -123,10 +124,13 @@ def _links(sequences: Sequence[_Way], kind: str) -> dict[str, int]:
     return asdict(sum((each.links[kind] for each in sequences), Links()))
 
 
-def _lstq(velocity: list[float], nearest: list[float]) -> dict[str, float]:
-    gain = paired_difference(velocity, nearest)
-    means = {"velocity": sum(velocity) / len(velocity), "nearest": sum(nearest) / len(nearest)}
-    return means | {"difference": gain.mean, "low": gain.low, "high": gain.high}
+def _lstq(velocity: list[float], nearest: list[float]) -> dict[str, float | None]:
+    """Means and the difference over the sequences that have a figure: one without things has none."""
+    ways = np.array([velocity, nearest])
+    ways = ways[:, np.isfinite(ways).all(0)]
+    gain = paired_difference(*ways.tolist())
+    means = dict(zip(("velocity", "nearest"), ways.mean(1).tolist(), strict=True))
+    return means | {"difference": gain.value, "low": gain.low, "high": gain.high}
 
 
 def _by_class(errors: VelocityErrors, taxonomy: Taxonomy) -> dict[str, Any]:

@@ -19,6 +19,7 @@ PRESENT = (
     "PQ present: the mean over the classes that the held-out sequences have; official means count absent ones as 0."
 )
 CONTESTED = "contested: membership accuracy of the points that lie in the regions of several objects alone."
+OWN_REGIONS = "Clusterings make regions of their own: their membership accuracy would be one over other points."
 SMALL = "DSB drops instances of few points here (extent.min_points), whatever their size; the paper drops small boxes."
 
 
@@ -66,6 +67,7 @@ def memberships(group: Group) -> Ablation:
         key=lambda rows: (len(rows), rows[0].extent == "track_max"),
     )
     notes = (f"Stage 1 here: {found[0].title}.", *_settings(group), CONTESTED, PRESENT)
+    notes += () if all(each.has_regions for each in found) else (OWN_REGIONS,)
     rows = {each.membership: each for each in found}
     return Ablation("table2", "Table II: membership functions", rows, MEMBERSHIP, notes, "nearest", beside=True)
 

@@ -2,17 +2,18 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float64
 
-from most.reports.bootstrap import Interval, Resampling
+from most.metrics.bootstrap import Interval, Resampling
 from most.reports.figures import Figures, Presence, figures
 from most.reports.groups import Group
 from most.reports.runs import Scored
 from most.reports.table import Cells
-from most.reports.units import BySeed, units
+from most.reports.units import BySeed, paired, units
 
 
 class Analysis:
@@ -31,12 +32,13 @@ class Analysis:
         return {title: self._interval(runs, key) for title, key in columns.items()}
 
     def differences(self, runs: BySeed, others: BySeed, columns: Mapping[str, str]) -> Cells:
-        """How much higher the figures of ``runs`` are, over the seeds that both have; None without such."""
+        """How much higher the figures of ``runs`` are, over the seeds that are paired; None without such."""
+        runs, others = paired(runs, others)
         common = units(runs, others)
         found: Cells = {}
         for title, key in columns.items():
             ours, theirs = (self._drawn(each, common, key) for each in (runs, others))
-            found[title] = None if ours is None or theirs is None else self._known(ours - theirs)
+            found[title] = None if ours is None or theirs is None else self._known(ours - theirs, (-1, 1))
         return found
 
     def by_seed(self, runs: BySeed, key: str) -> dict[int, float]:
@@ -46,13 +48,13 @@ class Analysis:
 
     def _interval(self, runs: BySeed, key: str) -> Interval | None:
         if (drawn := self._drawn(runs, units(runs), key)) is not None:
-            return self._known(drawn)
+            return self._known(drawn, (0, 1))
         official = [_reported(each, key) for each in runs.values()]
         known = [value for value in official if value is not None]
         return Interval(float(np.mean(known))) if known and len(known) == len(official) else None
 
-    def _known(self, drawn: Float64[np.ndarray, "draws units"]) -> Interval | None:
-        found = self.resampling.interval(drawn)
+    def _known(self, drawn: Float64[np.ndarray, "draws units"], within: tuple[float, float]) -> Interval | None:
+        found = self.resampling.interval(drawn, within)
         return found if math.isfinite(found.value) else None
 
     def _drawn(
@@ -66,7 +68,8 @@ class Analysis:
 
     def _figures(self, run: Scored) -> Figures:
         if id(run) not in self._formed:
-            self._formed[id(run)] = figures(run.sums, self._presence, self._weights)
+            sums = run.sums if run.strategy.has_regions else replace(run.sums, membership=None)
+            self._formed[id(run)] = figures(sums, self._presence, self._weights)
         return self._formed[id(run)]
 
     @cached_property

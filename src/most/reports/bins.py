@@ -27,8 +27,8 @@ class Bins:
 OFFICIAL = "Segments count as officially."
 SEEN = (
     "How much of an object is seen: how long its points reach over ground in the scan, of the longest that they ever "
-    f"do in the sequence. {OFFICIAL} False segments count for the object that most of their points are of; objects "
-    "that are there in one scan alone are left out."
+    f"do in the sequence. {OFFICIAL} False segments count for the object that most of their points are of. Left out "
+    "are those of no object, objects that are there in one scan alone, and shares that fewer than 10 objects have."
 )
 
 

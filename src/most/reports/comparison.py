@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float64
 
-from most.reports.bootstrap import CONFIDENCE, Interval, Resampling
+from most.metrics.bootstrap import CONFIDENCE, Interval, Resampling
 from most.reports.figures import Figures, Presence, figures
 from most.reports.sums import Sums, read_sums
 from most.reports.table import between, percent
@@ -54,7 +55,7 @@ def format_differences(reports: Reports, draws: int = 10_000) -> str:
         rows = [[f"minus {first}", *columns]]
         rows += [[title, *(_cell(found.get(COMPARED[title])) for found in columns.values())] for title in titles]
         sequences = len(base.measured.sequences)
-        over = f"in brackets: {CONFIDENCE:.0%} of {draws} draws of the {sequences} sequences, one training each"
+        over = f"in brackets: {CONFIDENCE:.0%} intervals over the {sequences} sequences; one training each"
         said = [_aligned(rows), *([over] if sequences > 1 else []), *said]
     return "\n".join(said)
 
@@ -74,13 +75,22 @@ def _sums(name: str, report: Mapping[str, Any]) -> Sums | None:
 def _differences(base: Sums, sums: Sums, draws: int) -> dict[str, Interval]:
     """By key; figures that either report does not have are left out."""
     resampling, presence = Resampling(len(base.measured.sequences), draws), Presence.of([base, sums])
+    if not _same_regions(base, sums):
+        base = replace(base, membership=None)
     ours, theirs = (figures(each, presence, resampling.of_sequences()) for each in (sums, base))
     found = {
-        key: resampling.interval(_drawn(ours, theirs, key))
+        key: resampling.interval(_drawn(ours, theirs, key), (-1, 1))
         for key in COMPARED.values()
         if key in ours and key in theirs
     }
     return {key: interval for key, interval in found.items() if math.isfinite(interval.value)}
+
+
+def _same_regions(base: Sums, sums: Sums) -> bool:
+    """Whether membership accuracies are over as many points: those of other detections are not."""
+    if base.membership is None or sums.membership is None:
+        return False
+    return np.array_equal(base.membership[:, 1::2], sums.membership[:, 1::2])
 
 
 def _drawn(ours: Figures, theirs: Figures, key: str) -> Float64[np.ndarray, "draws 1"]:

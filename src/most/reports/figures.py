@@ -2,7 +2,8 @@
 
 One difference: a class that the held-out sequences have, but a draw of them has not, is left out of the draw's means
 instead of counting 0. Else a class that is in one sequence alone would let the figure jump by its share with every
-draw. Classes that no sequence has count 0, as officially.
+draw. Classes that no sequence has count 0, as officially. A class of objects too small to count is there as soon as
+one of the runs that are compared finds one of them, since a match counts however small it is.
 """
 
 from collections.abc import Sequence
@@ -15,6 +16,7 @@ from most.reports.sums import POINTS, SEGMENTS, Measured, Sums
 
 COLUMNS = {name: index for index, name in enumerate(SEGMENTS + POINTS)}
 TINY = 1e-15
+FEWEST = 10  # objects that PQ is formed of in a bin
 Figures = dict[str, Float64[np.ndarray, "draws"]]
 
 
@@ -49,7 +51,8 @@ def figures(sums: Sums, presence: Presence, weights: Float64[np.ndarray, "draws 
             found[f"{name}{part}_present"] = _mean(values, here)
     found["pq_dagger"] = _dagger(of_class, there, ever, sums.measured)
     named = [(index, name) for index, name in enumerate(sums.measured.classes) if ever["segments"][index]]
-    found |= {f"pq/{name}": of_class["pq"][:, index] for index, name in named}
+    pq = np.where(there["segments"], of_class["pq"], np.nan)
+    found |= {f"pq/{name}": pq[:, index] for index, name in named}
     tracking = _tracking(sums, weights, of_class, found["miou"])
     tracking |= _tracks(sums, weights, there["segments"], found["pq"])
     return found | _binned(sums, weights) | _memberships(sums, weights) | tracking
@@ -83,7 +86,7 @@ def _dagger(
 
 
 def _binned(sums: Sums, weights: Float64[np.ndarray, "draws sequences"]) -> Figures:
-    """PQ of all things together in each bin, NaN where there is none."""
+    """PQ of all things together in each bin that has some objects, NaN in draws without any."""
     found: Figures = {}
     for name in ("distance", "points", "visible"):
         if (counts := getattr(sums, name)) is None:
@@ -91,7 +94,8 @@ def _binned(sums: Sums, weights: Float64[np.ndarray, "draws sequences"]) -> Figu
         tp, fp, fn, iou = np.moveaxis(np.tensordot(weights, counts, 1), 1, 0)
         with np.errstate(invalid="ignore"):
             pq = iou / (tp + fp / 2 + fn / 2)
-        found |= {f"{name}/{index}": column for index, column in enumerate(pq.T)}
+        objects = counts[:, [SEGMENTS.index("tp"), SEGMENTS.index("fn")]].sum((0, 1))
+        found |= {f"{name}/{index}": pq[:, index] for index in np.flatnonzero(objects >= FEWEST)}
     return found
 
 

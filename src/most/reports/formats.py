@@ -22,12 +22,13 @@ def markdown(table: Table) -> str:
     return "\n".join([*lines, "", *(f"*{note}*\n" for note in table.notes)])
 
 
-def latex(table: Table) -> str:
-    """A tabular for booktabs."""
+def latex(table: Table, before: str = "") -> str:
+    """A tabular for booktabs; ``before`` tells its label from those of other groups."""
     head = ["", *table.columns, *(["order"] if table.words else []), "seeds"]
     width = len(head)
     lines = [
-        r"\begin{table*}", rf"\caption{{{_tex(table.title)}}}", rf"\label{{tab:{table.name}}}", r"\centering\small",
+        r"\begin{table*}", rf"\caption{{{_tex(table.title)}}}",
+        rf"\label{{tab:{before}{table.name}}}", r"\centering\small",
         rf"\begin{{tabular}}{{l{'r' * (width - 1)}}}", r"\toprule", _tex_line(map(_tex, head)),
     ]  # fmt: skip
     for block in table.blocks:

@@ -12,7 +12,8 @@ from most.reports.strategy import AXES, Strategy, plain_names
 from most.reports.sums import Measured
 
 ASIDE = (  # what else runs that are compared may differ in: who ran them and where, and what makes rows of them
-    *("seed", "stage1", "trainer", "dataset.root", "stage.run", "backbone.separate"),
+    *("seed", "stage1", "dataset.root", "stage.run", "backbone.separate"),
+    *(f"trainer.{name}" for name in ("accelerator", "devices", "strategy", "validate_every")),
     *(*NO_FIGURE, *AXES),
 )
 SOURCES = (EVALUATED, VALIDATED, BESIDE)  # of two with the same strategy and seed, the first is taken

@@ -7,10 +7,10 @@ from most.reports.units import BySeed, units
 
 SHARED = "Seeds that stand on one stage 1 are drawn as one: they are no independent trainings."
 ALONE = (
-    "One training of stage 1 a row: intervals tell of the held-out sequences alone. Another training may come out "
-    "otherwise, whatever they say."
+    "One training of stage 1: intervals tell of the held-out sequences alone. Another training may come out otherwise, "
+    "whatever they say. So it is with"
 )
-FEW = 5  # seeds or sequences, of which intervals are noticeably too narrow: see most.reports.bootstrap
+ONE_SEQUENCE = "One held-out sequence: intervals tell of seeds alone. Other sequences may come out otherwise."
 UNTOLD = (
     "not every report says with which settings of membership and tracker it was predicted (those of most.track, of "
     "others' predictions and of earlier versions do not); they are taken for the defaults."
@@ -30,15 +30,13 @@ def unseen(rows: Mapping[str, BySeed]) -> Iterator[str]:
 
 def remarks(group: Group) -> Iterator[str]:
     """Say what intervals of a group's runs do not tell."""
-    trainings = [units(group.by_seed(each)) for each in group.strategies]
-    if any(len(part) > 1 for parts in trainings for part in parts):
+    trainings = {f"{each.title}, {each.membership}": units(group.by_seed(each)) for each in group.strategies}
+    if any(len(part) > 1 for parts in trainings.values() for part in parts):
         yield SHARED
-    most, sequences = max(map(len, trainings)), len(group.measured.sequences)
-    if most == 1:
-        yield ALONE
-    few = {"sequences": sequences, "seeds": most}
-    if said := [f"{count} {name}" for name, count in few.items() if 1 < count <= FEW]:
-        yield f"Intervals of {' and '.join(said)} are too narrow: of three by about a fifth, of five by a tenth."
+    if alone := [title for title, parts in trainings.items() if len(parts) == 1]:
+        yield f"{ALONE} {'all rows' if len(alone) == len(trainings) else '; '.join(alone)}."
+    if len(group.measured.sequences) == 1:
+        yield ONE_SEQUENCE
 
 
 def predictions(rows: Mapping[str, BySeed]) -> Iterator[str]:

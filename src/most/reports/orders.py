@@ -3,14 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from most.metrics.bootstrap import Interval
 from most.reports.ablations import Ablation
 from most.reports.analysis import Analysis
-from most.reports.bootstrap import Interval
 from most.reports.paper import paper_figure
 from most.reports.strategy import EXTENTS
 from most.reports.table import Block, Cells, Row, Table
 from most.reports.tables import measured_here
-from most.reports.units import units
+from most.reports.units import paired, units
 
 SW, NEAREST = "shrink_wrap", "nearest"
 WORDS = ("shown", "reversed", "open")
@@ -50,8 +50,10 @@ COLUMNS = {"PQ": "pq", "PQ Th": "pq_things"}
 PAPERS = {f"paper: {column}": column for column in COLUMNS}
 NOTE = (
     "Differences, percent points. The order of PQ shows where the interval lies above 0, is reversed where it lies "
-    "below, and is open in between; beside it, how many of all draws agree with the paper. Extents are made "
-    "for things (PQ Th). Behind ours are the paper's own, on Panoptic nuScenes, validation."
+    "below, and is open in between; beside it, how many of all draws agree with the paper. Each row is told by itself: "
+    "of twenty rows without any difference, one would be called shown or reversed. Of one training no order can be "
+    "told; its interval is of other sequences with the same weights. Extents are made for things (PQ Th). Behind ours "
+    "are the paper's own, on Panoptic nuScenes, validation."
 )
 
 
@@ -65,14 +67,14 @@ def order_table(ablations: Mapping[str, Ablation], analysis: Analysis) -> Table 
         title = " above ".join(NAMES.get(name, name) for name in (claim.better, claim.worse))
         better, worse = (ablation.runs(analysis.group, ablation.rows[name]) for name in (claim.better, claim.worse))
         differences = analysis.differences(better, worse, COLUMNS)
-        rows.append(Row(title, differences | _papers(claim), units(better, worse)))
-        said[title] = verdict(differences["PQ"])
+        rows.append(Row(title, differences | _papers(claim), units(*paired(better, worse))))
+        said[title] = verdict(differences["PQ"], len(rows[-1].parts))
     if not rows:
         return None
     block = Block(measured_here(analysis), tuple(rows), ours=True)
     shown = ", ".join(f"{sum(text.startswith(word) for text in said.values())} {word}" for word in WORDS)
-    alone = ", by one training a row" if all(len(row.parts) == 1 for row in rows) else ""
-    title = f"Does the paper's order show? Of {len(rows)}: {shown}{alone}"
+    untold = sum(not text.startswith(WORDS) for text in said.values())
+    title = f"Does the paper's order show? Of {len(rows)}: {shown}" + (f", {untold} not told" if untold else "")
     return Table(
         "orders", title, (*COLUMNS, *PAPERS), (block,), (NOTE,), signed=True, words=said, papers=frozenset(PAPERS)
     )
@@ -86,11 +88,13 @@ def _papers(claim: Claim) -> Cells:
     return found
 
 
-def verdict(difference: Interval | None) -> str:
-    """Say how surely a difference is above 0."""
+def verdict(difference: Interval | None, trainings: int) -> str:
+    """Say how surely a difference, of as many pairs of trainings, is above 0."""
     if difference is None:
         return "no seed in common"
     if difference.low is None or difference.high is None or difference.above is None:
         return "no interval: one training, one sequence"
-    said = WORDS[0 if difference.low > 0 else 1 if difference.high < 0 else 2]
-    return f"{said} ({100 * difference.above:.1f} % of draws agree)"
+    agree = f"({100 * difference.above:.1f} % of draws agree)"
+    if trainings == 1:
+        return f"one training {agree}"
+    return f"{WORDS[0 if difference.low > 0 else 1 if difference.high < 0 else 2]} {agree}"

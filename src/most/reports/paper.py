@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from most.reports.bootstrap import Interval
+from most.metrics.bootstrap import Interval
 from most.reports.table import Block, Row
 
 

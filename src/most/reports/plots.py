@@ -13,10 +13,10 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from most.metrics.bootstrap import Interval
 from most.reports.ablations import Ablation
 from most.reports.analysis import Analysis
 from most.reports.bins import Bins, by_distance, by_points, by_visible
-from most.reports.bootstrap import Interval
 
 INK = "#010203"
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#7a5195")  # Okabe and Ito's, readable
@@ -72,7 +72,7 @@ def _bars(name: str, title: str, ablation: Ablation, analysis: Analysis, keys: d
                     series,
                     label if not place else None,
                 )
-        axes.set_yticks(range(len(rows)), list(rows))
+        axes.set_yticks(range(len(rows)), [_plain(row) for row in rows])
         axes.invert_yaxis()
         axes.set_xlabel("%")
         axes.grid(axis="x", alpha=0.2, color=INK)
@@ -117,14 +117,19 @@ def _curves(bins: Bins, ablation: Ablation, analysis: Analysis) -> Plot | None:
 
 
 def _curve(axes: Axes, row: str, cells: Sequence[Interval], series: int, shift: float) -> None:
-    colour, mark = COLOURS[series % len(COLOURS)], MARKS[series % len(MARKS)]
+    colour, mark = COLOURS[series % len(COLOURS)], MARKS[(series + series // len(MARKS)) % len(MARKS)]
     low, high = (
         [100 * (cell.value if bound is None else bound) for cell, bound in zip(cells, bounds, strict=True)]
         for bounds in ([cell.low for cell in cells], [cell.high for cell in cells])
     )
     places = [place + shift for place in range(len(cells))]
     axes.vlines(places, low, high, color=colour, alpha=0.6, linewidth=1.5)
-    axes.plot(places, [100 * cell.value for cell in cells], mark + "-", color=colour, label=row, markersize=5)
+    axes.plot(places, [100 * cell.value for cell in cells], mark + "-", color=colour, label=_plain(row), markersize=5)
+
+
+def _plain(text: str) -> str:
+    """A row's title as it is: between two dollars it would be taken for a formula."""
+    return text.replace("$", r"\$")
 
 
 def _said(cells: Mapping[str, Interval | None]) -> str:

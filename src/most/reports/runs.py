@@ -50,13 +50,16 @@ class Runs:
 
 
 def find_runs(folder: Path) -> Runs:
-    """Read all runs in a folder; raises DataError where there is none, and for files that are damaged."""
+    """Read all runs in a folder, but for damaged ones; raises DataError where there is none."""
     if not folder.is_dir():
         raise DataError(f"runs: expected a folder of runs of most.train, found no folder {folder}; check runs=...")
     runs = Runs([], {})
     for path in sorted(folder.rglob(".hydra")):
-        if path.is_dir() and "stage" in (config := _yaml(path / "config.yaml", dict)):
-            _read(path.parent, config, runs)
+        if path.is_dir():
+            try:
+                _read(path.parent, runs)
+            except DataError as error:
+                runs.left_out[path.parent] = f"damaged: {error}"
     if not runs.scored and not runs.left_out:
         raise DataError(
             f"{folder}: expected runs of most.train (folders with .hydra and metrics.json), found none; check runs=..."
@@ -64,12 +67,15 @@ def find_runs(folder: Path) -> Runs:
     return runs
 
 
-def _read(folder: Path, config: Mapping[str, Any], runs: Runs) -> None:
-    """Add what a run was scored by, or why it cannot be."""
+def _read(folder: Path, runs: Runs) -> None:
+    """Add what a run was scored by, or why it cannot be; other programs' folders are none of ours."""
+    config = _yaml(folder / ".hydra" / FILES[0], dict)
+    if "stage" not in config:
+        return
     hydra, overrides = (
         _yaml(folder / ".hydra" / name, kind) for name, kind in zip(FILES[1:], (dict, list), strict=True)
     )
-    runtime = hydra.get("hydra", {}).get("runtime", {})
+    runtime = (hydra.get("hydra") or {}).get("runtime") or {}
     choices = runtime.get("choices")
     if not isinstance(choices, dict) or not {"extent", "membership", "dataset"} <= choices.keys():
         raise DataError(f"{folder / '.hydra/hydra.yaml'}: expected hydra.runtime.choices of most.train, found none")
@@ -116,14 +122,14 @@ def _predicted_by(report: Mapping[str, Any], name: str, trained: str) -> str:
     told = _told(report)
     if told is None:
         return trained if trained.split(" ")[0] == name else name
-    said = str(report["prediction"]["membership"])
+    said = str(report["prediction"].get("membership", trained))
     return trained if said == "trained" else said + changed("membership", told)
 
 
 def _told(report: Mapping[str, Any]) -> tuple[str, ...] | None:
     """Return what prediction was told besides defaults; None for a report that does not say."""
     prediction = report.get("prediction")
-    return tuple(map(str, prediction["changed"])) if isinstance(prediction, Mapping) else None
+    return tuple(map(str, prediction.get("changed", ()))) if isinstance(prediction, Mapping) else None
 
 
 def _stage1(config: Mapping[str, Any], runtime: Mapping[str, Any], folder: Path) -> str:

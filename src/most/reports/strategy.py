@@ -13,7 +13,8 @@ MEMBERSHIPS = {
     "geometric_bev": "+ BEV feat.",
     "full": "+ Point feat. (full)",
 }
-UNTRAINED = ("nearest", "clustering", "mean_shift")
+CLUSTERINGS = ("clustering", "mean_shift")  # make regions of their own
+UNTRAINED = ("nearest", *CLUSTERINGS)
 AXES = ("extent", "heads", "membership")  # groups of the configuration that a table's rows differ in
 PAPER = "modal_centres"
 
@@ -31,6 +32,11 @@ class Strategy:
     def has_centres(self) -> bool:
         """Whether modal centres are detected, as the paper does."""
         return _parted(self.heads)[0] == PAPER
+
+    @property
+    def has_regions(self) -> bool:
+        """Whether points are given to the regions of detected centres, over which the membership accuracy is taken."""
+        return _parted(self.membership)[0] not in CLUSTERINGS
 
     @property
     def detection(self) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ class Measured:
     sequences: tuple[tuple[str, int], ...]  # and the number of scans of each
     distance_edges: tuple[float, ...]
     points_edges: tuple[float, ...]
+    truth: str  # a digest of how many points of each class each sequence has: other scans have others
 
 
 @dataclass
@@ -46,6 +48,7 @@ class Sums:
 def read_sums(section: Any, where: str) -> Sums:
     """Take a section to arrays; a DataError names what is missing or misshapen ``where``."""
     try:
+        points = np.array([each["true"] for each in section["sequences"].values()], np.float64)
         measured = Measured(
             evaluator=str(section["evaluator"]),
             classes=tuple(map(str, section["classes"])),
@@ -54,6 +57,7 @@ def read_sums(section: Any, where: str) -> Sums:
             sequences=tuple((str(name), int(each["scans"])) for name, each in section["sequences"].items()),
             distance_edges=tuple(map(float, section["distance_edges"])),
             points_edges=tuple(map(float, section["points_edges"])),
+            truth=sha256(points.tobytes()).hexdigest(),
         )
         seen = section.get("visible_edges") == list(VISIBLE)
         return _arrays(measured, list(section["sequences"].values()), seen)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from most.reports.bootstrap import Interval
+from most.metrics.bootstrap import Interval
 
 Cells = dict[str, Interval | None]  # by column; None is what is not known
 

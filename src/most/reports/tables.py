@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from most.metrics.paper_tables import MEANS, SEGMENTATION, TRACKING, class_order
 from most.reports.ablations import Ablation
 from most.reports.analysis import Analysis
@@ -11,7 +13,7 @@ from most.reports.notes import predictions, trackers, unseen, unsummed
 from most.reports.paper import paper_block
 from most.reports.sums import SEGMENTS
 from most.reports.table import Block, Row, Table
-from most.reports.units import BySeed, units
+from most.reports.units import BySeed, paired, units
 
 
 def measured_here(analysis: Analysis) -> str:
@@ -41,7 +43,7 @@ def difference_table(ablation: Ablation, analysis: Analysis, baseline: str | Non
         runs = ablation.runs(analysis.group, each)
         if each != base:
             cells = analysis.differences(runs, others, ablation.columns)
-            made.append(Row(ablation.title_of(each), cells, units(runs, others)))
+            made.append(Row(ablation.title_of(each), cells, units(*paired(runs, others))))
     if not made:
         return None
     title = f"{ablation.title}, differences to {ablation.title_of(base)}"
@@ -56,9 +58,9 @@ def occlusion_tables(ablation: Ablation, analysis: Analysis, baseline: str | Non
     known = [run.sums.visible for runs in rows.values() for run in runs.values() if run.sums.visible is not None]
     if not known:
         return []
-    objects = known[0][:, [SEGMENTS.index("tp"), SEGMENTS.index("fn")]].sum((0, 1))
+    objects = np.max([seen[:, [SEGMENTS.index("tp"), SEGMENTS.index("fn")]].sum((0, 1)) for seen in known], 0)
     shown = ", ".join(f"{count:g} of {label}" for label, count in zip(bins.labels, objects, strict=True))
-    notes = (bins.meaning, f"Objects in all scans: {shown}.", *unseen(rows))
+    notes = (bins.meaning, f"Objects in all scans, at most: {shown}.", *unseen(rows))
     parted = replace(ablation, name="occlusion", title=f"{bins.title}, by the {bins.axis}", columns=bins.columns)
     whole = _table(analysis, parted.name, parted.title, rows, parted.columns, notes, paper=None)
     apart = difference_table(parted, analysis, baseline)
@@ -72,14 +74,18 @@ def benchmark_tables(analysis: Analysis) -> list[Table]:
     evaluator = group.measured.evaluator
     name, title = ("table3", "Table III") if evaluator == "nuscenes" else ("table4", "Table IV")
     made = [_table(analysis, name, f"{title}: lidar panoptic segmentation", rows, SEGMENTATION, paper=name)]
-    tracked = {name: runs for name, runs in rows.items() if all(each.sums.tracks is not None for each in runs.values())}
-    if tracked:
+    if tracked := {name: found for name, runs in rows.items() if (found := _tracked(runs))}:
         title, columns = "Table V: 4D lidar panoptic segmentation", TRACKING | {"PQ": "pq"}
         notes = (*trackers(tracked), *unsummed(tracked, evaluator))
         made.append(_table(analysis, "table5", title, tracked, columns, notes, paper=f"table5_{evaluator}"))
     classes = {name: f"pq/{name}" for name in class_order(dict.fromkeys(group.measured.classes[1:]))}
     paper = f"classes_{evaluator}"
     return [*made, _table(analysis, "classes", "PQ by class (supplement)", rows, classes | MEANS, paper=paper)]
+
+
+def _tracked(runs: BySeed) -> BySeed:
+    """The runs whose 4D figures are known."""
+    return {seed: run for seed, run in runs.items() if run.sums.tracks is not None}
 
 
 def _runs(ablation: Ablation, analysis: Analysis) -> dict[str, BySeed]:

@@ -17,9 +17,9 @@ from most.reports.runs import Runs, find_runs
 from most.reports.tables import ablation_table, benchmark_tables, difference_table, occlusion_tables
 
 METHOD = (
-    "Means over seeds in percent; below them what 95 % of all draws lie between, of seeds first and held-out sequences "
-    "then, the same draws for all rows. What is said to be the paper's (italic, on tinted ground) was measured on "
-    "other data: it is there to compare orders, not figures."
+    "Means over seeds in percent; below them 95 % intervals, of draws of seeds first and held-out sequences then, the "
+    "same draws for all rows, spread as far as so few seeds and sequences ask for. What is said to be the paper's "
+    "(italic, on tinted ground) was measured on other data: it is there to compare orders, not figures."
 )
 
 
@@ -71,7 +71,10 @@ def _files(chapters: Sequence[Chapter], left_out: Mapping[str, str], summary: st
         text += map(markdown, chapter.ablations)
         text += [f"![{plot.title}](plots/{before}{plot.name}.svg)\n\n{plot.meaning}\n" for plot in chapter.plots]
         text += map(markdown, chapter.benchmarks)
-        tex += [*(f"% {line}" for line in (chapter.title, *chapter.remarks)), *map(latex, chapter.tables)]
+        tex += [
+            *(f"% {line}" for line in (chapter.title, *chapter.remarks)),
+            *(latex(table, before) for table in chapter.tables),
+        ]
         files |= {f"tables/{before}{table.name}.csv": comma_separated(table) for table in chapter.tables}
         files |= {f"plots/{before}{plot.name}.svg": plot.svg.replace(INK, "#222") for plot in chapter.plots}
     if left_out:

@@ -117,7 +117,10 @@ class DetectionStage(Stage):
     def configure_optimizers(self) -> OptimizerLRSchedulerConfig:
         """See :func:`one_cycle`."""
         optimizer, schedule = one_cycle(self.network.parameters(), self.training_settings, self.steps)
-        return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
+        return {
+            "optimizer": optimizer,
+            "lr_scheduler": {"scheduler": schedule, "interval": "step", "name": LEARNING_RATE},
+        }
 
 
 def one_cycle(

@@ -15,6 +15,7 @@ PARTS = ("heatmap", "voxel", "point", "offset", "height", "extent", "velocity", 
 QUALITY = ("pq", "pq_things", "pq_stuff", "sq", "rq", "miou", "pq_present", "miou_present")
 ACCURACY = ("membership_accuracy", "membership_accuracy_contested")
 STAGE2 = "membership/"  # before the keys of stage 2
+RATES = ("learning_rate", "lr-SGD")  # of stage 1, whatever its optimiser, and of stage 2
 
 
 @dataclass
@@ -34,10 +35,10 @@ class Section:
     panels: list[Panel]
 
 
-def layout(class_names: Sequence[str], pictures: int, learning_rates: Sequence[str]) -> list[Section]:
+def layout(class_names: Sequence[str], pictures: int) -> list[Section]:
     """Return the sections for runs of both stages.
 
-    ``class_names`` are those with curves of their own; ``pictures`` and ``learning_rates`` are what runs log.
+    ``class_names`` are those with curves of their own; ``pictures`` are as many as runs log.
     """
     sections = [
         Section("Losses", [_curve(f"{before}train/loss") for before in ("", STAGE2)]),
@@ -48,7 +49,7 @@ def layout(class_names: Sequence[str], pictures: int, learning_rates: Sequence[s
         Section("Throughput", [_curve(f"{before}train/scans_per_second") for before in ("", STAGE2)]),
     ]
     sections[0].panels += [_curve(f"train/loss_{part}") for part in PARTS]
-    sections[-1].panels += [_curve(name) for name in learning_rates]
+    sections[-1].panels += [_curve(name) for name in RATES]
     return [section for section in sections if section.panels]
 
 
