@@ -101,7 +101,7 @@ def test_a_compression_that_nobody_knows_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "000000.npz"
     write_assignments(path, assignments(2))
     content = path.read_bytes()
-    path.write_bytes(re.sub(rb"(PK\1\2.{6})\x08\0", rb"\g<1>\x63\0", content, flags=re.DOTALL))
+    path.write_bytes(re.sub(rb"(PK\x01\x02.{6})\x08\0", rb"\g<1>c\0", content, flags=re.DOTALL))
     assert path.read_bytes() != content
     with pytest.raises(DataError, match=r"000000\.npz: expected an \.npz file of detections"):
         read_assignments(path)
