@@ -1,5 +1,6 @@
 """Checkpoints: what is loaded is what was saved, and whatever else a file holds is refused unexecuted."""
 
+import math
 import pickle
 from pathlib import Path
 
@@ -247,6 +248,18 @@ OTHERS = {
     "later component": (setting("most", "parts", "membership", "component", value="learnt"), "found learnt.*version"),
     "later setting": (setting("most", "parts", "grid", "settings", "spin", value=1), "grid.*spin.*version that wrote"),
     "out of range": (setting("most", "parts", "grid", "settings", "voxel_size", value=[0.0] * 3), "voxel_size"),
+    "no size": (setting("most", "parts", "grid", "settings", "voxel_size", value=[math.nan] * 3), "voxel_size"),
+    "no end": (setting("most", "parts", "grid", "settings", "upper", value=[math.inf] * 3), "grid.upper"),
+    "a taxonomy elsewhere": (
+        setting("most", "taxonomy", "name", value="../taxonomies/nuscenes"),
+        "taxonomy: expected one",
+    ),
+    "fewer than no sweeps": (
+        setting("most", "sweeps", value=-1),
+        "sweeps: expected a number from 0 to 10000, found -1",
+    ),
+    "sweeps in words": (setting("most", "sweeps", value="x"), "sweeps: expected a number from 0 to 10000, found 'x'"),
+    "sweeps without end": (setting("most", "sweeps", value=10**30), "sweeps: expected a number from 0 to 10000"),
     "a part less": (lambda content: content["most"]["parts"].pop("encoder"), "encoder.*train it again"),
     "no weights": (without("state_dict"), "a whole checkpoint, found none of state_dict"),
     "a weight less": (lambda content: content["state_dict"].popitem() and content["state_dict"].popitem(), "Missing"),
@@ -260,6 +273,15 @@ def test_checkpoints_of_other_models_are_refused_with_a_remedy(tmp_path, other):
     content = checkpoint(tiny_predictor())
     change(content)
     with pytest.raises(DataError, match=rf"(?s)some\.ckpt: expected.*{message}"):
+        load_trained(save(tmp_path, content))
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_weights_that_are_not_finite_are_refused(tmp_path, value):
+    content = checkpoint(tiny_predictor())
+    name, weights = next(item for item in content["state_dict"].items() if item[1].is_floating_point())
+    content["state_dict"][name] = weights.fill_(value)
+    with pytest.raises(DataError, match=rf"some\.ckpt: {name}: expected finite weights, found others"):
         load_trained(save(tmp_path, content))
 
 

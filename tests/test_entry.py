@@ -23,11 +23,19 @@ def test_a_users_mistake_is_its_message_alone(kind, capsys):
     assert capsys.readouterr() == ("", "most: scan.bin: expected points, found none\n")
 
 
-@pytest.mark.parametrize("error", [ValueError("ours"), KeyboardInterrupt(), SystemExit(1)])
+@pytest.mark.parametrize("error", [ValueError("ours"), SystemExit(1)])
 def test_anything_else_passes_through(error):
     with pytest.raises(type(error)) as passed:
         run(failing(error))
     assert passed.value is error
+
+
+@pytest.mark.parametrize(("goes_on", "said"), [(True, "stopped; the same command goes on"), (False, "stopped")])
+def test_whoever_stops_a_command_reads_one_line(goes_on, said, capsys):
+    with pytest.raises(SystemExit) as stop:
+        run(failing(KeyboardInterrupt()), goes_on)
+    assert stop.value.code == 130
+    assert capsys.readouterr() == ("", f"most: {said}\n")
 
 
 def test_work_that_ends_well_ends_quietly(capsys):

@@ -12,7 +12,7 @@ from most.datasets.reader import Frame
 from most.datasets.semantickitti import SemanticKITTI, Splits
 from most.datasets.window_stream import WindowStream
 from most.detections import PeakDetector
-from most.errors import DataError
+from most.errors import ConfigError, DataError
 from most.inference import Inference
 from most.predicting import write_predictions
 from most.predictions import read_prediction
@@ -131,7 +131,8 @@ def test_every_point_gets_class_confidence_and_number(model):
     points[5, :2] = 1e4
     step = model.step(points, np.eye(4), 0.0)
     assert len(step.semantics) == len(step.ids) == len(step.confidence) == len(points)
-    assert ((step.semantics > 0) & (step.confidence > 0) & (step.confidence <= 1)).all()
+    assert ((step.semantics > 0) & (step.confidence >= 0) & (step.confidence <= 1)).all()
+    assert (step.confidence == 0).nonzero().flatten().tolist() == [3, 4, 5]  # what the network never saw
     thing = TAXONOMY.is_thing(step.semantics)
     assert (step.ids[~thing] == 0).all()
     now = step.tracks.last_seen == 0.0
@@ -218,10 +219,13 @@ def test_the_callers_memory_may_be_used_again(model):
     [
         (np.zeros((5, 2)), np.eye(4), 1.0, r"points: expected N x 3 .* found the shape \(5, 2\)"),
         (np.zeros(12), np.eye(4), 1.0, r"points: expected N x 3"),
+        (np.zeros(5, [("x", "f4")]), np.eye(4), 1.0, "points: expected an array of numbers, .* makes one of fields"),
+        ([[1, 2, 3], [1, 2]], np.eye(4), 1.0, "points: expected one array of numbers, found rows that make none"),
+        (np.zeros((5, 3), complex), np.eye(4), 1.0, "points: expected an array of numbers, found complex128"),
         (np.zeros((5, 3)), np.eye(3), 1.0, r"pose: expected world_from_sensor, 4 x 4, found the shape \(3, 3\)"),
         (np.zeros((5, 3)), np.full((4, 4), math.nan), 1.0, "expected a finite pose"),
         (np.zeros((5, 3)), lidar_pose(3).T, 1.0, "pose: expected 0 0 0 1 in the last row"),
-        (np.zeros((5, 3)), 2 * np.eye(4), 1.0, "pose: expected rotations"),
+        (np.zeros((5, 3)), 2 * np.eye(4), 1.0, "pose: expected a rotation in the first three rows and columns"),
         (scan(1), lidar_pose(1), 0.05, "expected a time after the last sweep's 0.1 s"),
         (scan(1), lidar_pose(1), math.nan, "expected a time after the last sweep's 0.1 s"),
     ],
@@ -242,3 +246,135 @@ def test_memory_does_not_grow_with_the_stream(model):
         sizes.append(len(model.tracker.tracks()))
         assert len(model.state()["sweeps"]) <= PREVIOUS
     assert max(sizes[50:]) <= 1.5 * max(sizes[20:50])  # a second and a half after the start all tracks are new
+
+
+@pytest.mark.parametrize("array", [scan(0).astype(">f4"), scan(0)[::-1][::-1], np.asfortranarray(scan(0), np.float64)])
+def test_the_same_points_in_any_array_are_the_same_scan(model, array):
+    plain = model.step(scan(0), np.eye(4), 0.0)
+    model.begin()
+    assert same(model.step(array, np.eye(4).astype(">f8")[::-1][::-1], 0.0), plain)
+
+
+def test_a_pose_may_be_off_by_rounding(model):
+    plain = model.step(scan(0), np.eye(4), 0.0)
+    model.begin()
+    rounded = np.eye(4)
+    rounded[3] = [1e-9, 0, 0, 1 - 1e-9]
+    assert same(model.step(scan(0), rounded, 0.0), plain)
+
+
+def test_raw_intensities_say_what_scaled_ones_say(model, recwarn):
+    raw = scan(0)
+    raw[:, 3] *= 255
+    raw[:9, 3] = [math.nan, math.inf, -1, 256, 1e30, 0, 0, 0, 0]
+    clean = raw.copy()
+    clean[:, 3] = np.clip(raw[:, 3] / np.float32(255), 0, 1)
+    clean[:2, 3] = 0
+    scaled = PanopticTracker(Trained(tiny_predictor(9), TAXONOMY, 0), intensity_scale=255.0)
+    expected = PanopticTracker(Trained(tiny_predictor(9), TAXONOMY, 0)).step(clean, np.eye(4), 0.0)
+    assert not recwarn
+    found = [scaled.step(raw, np.eye(4), time) for time in (0.0, 0.1)]
+    assert torch.equal(found[0].confidence, expected.confidence)
+    assert same(found[0], expected)
+    (told,) = recwarn
+    assert "points: expected intensities up to intensity_scale=255, found 1e+30" in str(told.message)
+    with pytest.raises(ConfigError, match="intensity_scale: expected a number > 0, found 0"):
+        PanopticTracker(Trained(tiny_predictor(9), TAXONOMY, 0), intensity_scale=0.0)
+
+
+@pytest.mark.parametrize("height", [1e4, -1e10, 3e38])
+def test_points_at_absurd_heights_spoil_no_others(height):
+    points = scan(0)
+    points[:300, :3] = [1.0, 1.0, 0.1]  # many points of one voxel; some of them stray
+    strayed = np.concatenate([points, [[1.0, 1.0, height, 0.5]] * 3]).astype(np.float32)
+    plain = tracker(0).step(points, np.eye(4), 0.0)
+    found = tracker(0).step(strayed, np.eye(4), 0.0)
+    assert torch.equal(found.semantics[:600], plain.semantics)
+    assert torch.equal(found.confidence[:600], plain.confidence)
+    assert found.confidence[600:].tolist() == [0, 0, 0]
+    assert found.tracks.centres.abs().max() < 1e3
+
+
+def test_scans_without_a_point_in_range_are_told_of_once(model, recwarn):
+    for index in range(3):
+        model.step(scan(index) * np.float32([1000, 1000, 1000, 1]) + np.float32([1e4, 0, 0, 0]), np.eye(4), 0.1 * index)
+    (told,) = recwarn
+    assert "no point of a scan is in range (x, y, z: -8 to 8, -8 to 8, -2 to 2): are these metres" in str(told.message)
+
+
+def test_times_in_other_units_are_told_of_once(model, recwarn):
+    for index in range(3):
+        model.step(scan(index), lidar_pose(index), 1_695_123_456_000_000_000 + 100_000_000 * index)
+    (told,) = recwarn
+    assert "a scan comes 100000000 s after the last: give times in seconds, and call begin()" in str(told.message)
+
+
+def test_after_a_pause_the_window_begins_anew(model):
+    model.step(scan(0), lidar_pose(0), 0.0)
+    late = model.step(scan(1), lidar_pose(1), 5.1)
+    model.begin()
+    assert torch.equal(model.step(scan(1), lidar_pose(1), 0.0).confidence, late.confidence)
+    model.begin()
+    model.step(scan(0), lidar_pose(0), 0.0)
+    assert not torch.equal(model.step(scan(1), lidar_pose(1), 5.0).confidence, late.confidence)
+
+
+def test_a_sweep_without_a_pose_fills_no_window(model):
+    with pytest.warns(UserWarning, match="no pose"):
+        model.accumulate(scan(5), None, 0.0)
+    found = model.step(scan(1), lidar_pose(1), 0.1)
+    model.begin()
+    assert torch.equal(model.step(scan(1), lidar_pose(1), 0.0).confidence, found.confidence)
+
+
+def without_a_row(state):
+    state["tracker"]["centres"] = state["tracker"]["centres"][:1]
+
+
+def of_other_classes(state):
+    state["tracker"]["classes"] += 100
+
+
+def without_points(state):
+    state["sweeps"] = [{"x": 1}]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (without_a_row, r"state: centres: expected torch.float64 of shape \(\d+, 3\), found .* \(1, 3\)"),
+        (of_other_classes, "tracks: expected classes up to 19"),
+        (without_points, "state: expected what state"),
+        (dict.clear, "state: expected what state.. of a tracker returned, found another .KeyError: 'tracker'"),
+        (lambda state: state.update(previous=1), "one of a model with 2 previous sweeps, found one with 1"),
+        (lambda state: state.update(time="late"), "state: expected what state"),
+        (lambda state: state["tracker"].update(given=torch.zeros(3)), "state: given: expected torch.int64"),
+    ],
+)
+def test_a_state_that_is_refused_changes_nothing(model, reader, spoil, message):
+    whole = stream(model, reader)
+    model.begin()
+    stream(model, reader, range(3))
+    other = tracker()
+    stream(other, reader, range(2))
+    spoil(state := other.state())
+    with pytest.raises(DataError, match=message):
+        model.restore(state)
+    assert all(map(same, stream(model, reader, range(3, SCANS)), whole[3:]))
+
+
+def test_a_state_of_another_motion_changes_nothing(model, reader):
+    other = tracker(settings=TrackerSettings(motion="kalman"))
+    stream(other, reader, range(2))
+    before = len(stream(model, reader, range(2))[-1].tracks)
+    with pytest.raises(DataError, match="expected the state of a tracker of the same motion"):
+        model.restore(other.state())
+    assert len(model.tracker.tracks()) == before
+
+
+def test_a_gpu_that_is_not_there_is_refused_before_the_checkpoint_is_read(monkeypatch, tmp_path):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    with pytest.raises(ConfigError, match="device: expected auto, cpu, or cuda where there is a GPU, found cuda"):
+        PanopticTracker.from_checkpoint(tmp_path / "none.ckpt", device="cuda")
+    trained = Trained(tiny_predictor(9), TAXONOMY, 0)
+    assert PanopticTracker(trained, device="auto").device == torch.device("cpu")

@@ -34,6 +34,11 @@ def test_points_share_voxels_and_windows_do_not():
     assert voxels.point_voxel.tolist() == [0, 0, 1]
 
 
+def test_heights_far_beyond_the_grid_are_out_of_range():
+    rows = [(0.0, 0.0, 51.0), (0.0, 0.0, -51.0), (0.0, 0.0, 51.1), (0.0, 0.0, -51.1), (0.0, 0.0, 3e38)]
+    assert GRID.in_range(sample(*rows).points).tolist() == [True, True, False, False, False]
+
+
 def test_heights_are_clipped_and_sides_are_not():
     rows = [(0.0, 0.0, -9.0), (0.0, 0.0, 9.0), (4.0, 0.0, 0.0), (0.0, math.nan, 0.0), (-4.0, 0.0, 0.0)]
     voxels = voxelise([sample(*rows)], GRID)

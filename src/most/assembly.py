@@ -13,7 +13,7 @@ from torch import nn
 from most.config import Config, from_plain, to_plain
 from most.datasets.reader import Frame
 from most.datasets.taxonomy import Taxonomy
-from most.errors import ConfigError, DataError
+from most.errors import ConfigError, DataError, named
 from most.heads import CentreHead, OrientedCentreHead, SemanticHead
 from most.inference import Predictor
 from most.membership import Channels, MeanShift, Membership, Nearest, PointSegMLPSettings
@@ -25,6 +25,7 @@ from most.network import Network, Trunk
 from most.voxels import Grid
 
 FORMAT = 3
+MOST_SWEEPS = 10_000  # previous sweeps in a window; whoever says more is not to be believed
 KEYS = ("most_run", "state_dict")  # beside "most", which describes the model: what it was trained with, its weights
 STAGE1_RUN = "most_stage1"  # in a checkpoint of stage 2: the ``most_run`` of the stage 1 that it stands on
 GROUPS = ("grid", "encoder", "backbone", "centre_head", "semantic_head", "membership", "inference")
@@ -184,8 +185,9 @@ def load_trained(path: Path) -> Trained:
     """Read a checkpoint; a file that is none, of another version or of another taxonomy, is a DataError."""
     checkpoint = read_checkpoint(path)
     try:
-        return _assemble(checkpoint["most"], checkpoint["state_dict"], stage1_run(checkpoint))
-    except (ConfigError, KeyError, TypeError, AttributeError, RuntimeError) as error:
+        with named(path):
+            return _assemble(checkpoint["most"], checkpoint["state_dict"], stage1_run(checkpoint))
+    except (ConfigError, LookupError, TypeError, AttributeError, ValueError, ArithmeticError, RuntimeError) as error:
         raise DataError(
             f"{path}: expected a model that this version of most can make, found another ({error}); "
             "load it with the version that wrote it, or train it again"
@@ -203,6 +205,8 @@ def _assemble(description: dict[str, Any], state: dict[str, Any], stage1: dict[s
     taxonomy = Taxonomy.load(description["taxonomy"]["name"])
     if describe_taxonomy(taxonomy) != description["taxonomy"]:
         raise ConfigError(f"taxonomy {taxonomy.name}: expected its classes and things, found others")
+    if type(sweeps := description["sweeps"]) is not int or not 0 <= sweeps <= MOST_SWEEPS:
+        raise ConfigError(f"sweeps: expected a number from 0 to {MOST_SWEEPS}, found {sweeps!r:.40}")
     parts = {group: from_plain(group, description["parts"][group]) for group in GROUPS}
     predictor = build_predictor(build_network(parts, taxonomy), parts, taxonomy)
     for name, module in predictor.modules().items():
@@ -211,13 +215,19 @@ def _assemble(description: dict[str, Any], state: dict[str, Any], stage1: dict[s
     drawn, sized = stage1.get("training", {}).get("targets"), stage1.get("extent")
     targets = None if drawn is None else HeatmapTargets(**drawn)
     extent = None if sized is None else from_plain("extent", sized)
-    return Trained(predictor, taxonomy, description["sweeps"], parts, stage1, targets, extent)
+    return Trained(predictor, taxonomy, sweeps, parts, stage1, targets, extent)
 
 
 def load_weights(module: nn.Module, name: str, state: dict[str, Any]) -> None:
-    """Give a part of a model the weights that a checkpoint's ``state_dict`` has under its name."""
+    """Give a part of a model the weights that a checkpoint's ``state_dict`` has under its name, if they are finite."""
     prefix = f"{name}."
-    module.load_state_dict({key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)})
+    own = {key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)}
+    if bad := [key for key, value in own.items() if not bool(value.isfinite().all())]:
+        raise DataError(
+            f"{prefix}{bad[0]}: expected finite weights, found others, here and in {len(bad) - 1} more; the training "
+            "diverged, or the file is damaged: take an earlier checkpoint, or train again"
+        )
+    module.load_state_dict(own)
 
 
 def exchange_membership(trained: Trained, membership: Any) -> Trained:

@@ -21,5 +21,16 @@ def claim(out: Path, name: str, content: dict[str, Any], others: str) -> None:
             raise DataError(f"{out}: expected a new or empty folder, found other files; choose another out")
         with atomic_write(path, "w") as file:
             file.write(record)
-    elif path.read_bytes() != record.encode():  # whatever it holds, it need not be JSON
-        raise DataError(f"{out}: holds {others}; choose another out, or remove it")
+    elif path.read_bytes() != record.encode():
+        raise DataError(f"{out}: holds {others} ({_differing(path, content)}); choose another out, or remove it")
+
+
+def _differing(path: Path, content: dict[str, Any]) -> str:
+    """Say which entries of a note are others than these."""
+    try:
+        found = dict(json.loads(path.read_text()))
+    except (ValueError, TypeError, RecursionError):  # whatever it holds, it need not be JSON
+        return f"{path.name} is no note of most"
+    plain = json.loads(json.dumps(content))
+    other = [name for name in {**plain, **found} if name not in found or found[name] != plain.get(name)]
+    return f"{path.name} has another {', another '.join(other) or 'order'}"

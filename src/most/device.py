@@ -8,6 +8,7 @@ from most.errors import ConfigError
 def chosen_device(name: str) -> torch.device:
     """Return the device of this name, for ``auto`` a GPU where there is one; a ConfigError where it is not there."""
     there = torch.cuda.is_available()
-    if name not in ("auto", "cpu", *(["cuda"] if there else [])):
+    gpus = ["cuda", *(f"cuda:{number}" for number in range(torch.cuda.device_count()))] if there else []
+    if name not in ("auto", "cpu", *gpus):
         raise ConfigError(f"device: expected auto, cpu, or cuda where there is a GPU, found {name}")
-    return torch.device("cuda" if there and name != "cpu" else "cpu")
+    return torch.device("cuda" if name == "auto" and there else "cpu" if name == "auto" else name)

@@ -1,7 +1,11 @@
-"""What all commands share: what a user can put right ends in one message, and a mistake in exit code 2."""
+"""What all commands share: what a user can put right ends in one message, and a mistake in exit code 2.
+
+Stopped with Ctrl-C, a command ends in one line, too.
+"""
 
 import errno
 import os
+import signal
 import sys
 from collections.abc import Callable, Collection
 from typing import NoReturn
@@ -18,6 +22,8 @@ KEY_ERRORS = (ConfigAttributeError, ConfigKeyError)
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 NO_RIGHT = (errno.EROFS, errno.EACCES, errno.EPERM)
 NO_PLACE = (errno.EISDIR, errno.ENOTDIR, errno.EEXIST)  # a folder where a file is to be, or a file on the way
+
+INTERRUPTED = 128 + signal.SIGINT
 
 
 def start(main: Callable[[], None]) -> None:
@@ -43,10 +49,12 @@ def _cause(error: Exception) -> list[str]:
     return [*str(cause).splitlines()[:1], *known] if cause else known
 
 
-def run(task: Callable[[], object]) -> None:
-    """Run a command's work."""
+def run(task: Callable[[], object], goes_on: bool = False) -> None:
+    """Run a command's work; ``goes_on``: given again after an interruption, the command takes up what it left."""
     try:
         task()
+    except KeyboardInterrupt:
+        end("stopped; the same command goes on" if goes_on else "stopped", INTERRUPTED)
     except MostError as error:
         end(_message(error), error.exit_code)
     except OSError as error:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 
 class MostError(Exception):
@@ -48,4 +49,15 @@ def check_entries(file: object, entries: int, points: int, what: str = "a label"
         raise DataError(
             f"{file}: expected {what} for each of the {whose}'s {points} points, found {entries}; one of the two is "
             "cut off, or of another scan or release: copy it again, or predict the scan again"
+        )
+
+
+def check_kept(what: str, found: Any, like: Any, rows: int) -> None:
+    """Refuse an array of a state that is to be restored, unless it has ``rows`` rows and is else as ``like``."""
+    shape = (rows, *like.shape[1:])
+    if not isinstance(found, type(like)) or found.dtype != like.dtype or tuple(found.shape) != shape:
+        kind, size = getattr(found, "dtype", type(found).__name__), tuple(getattr(found, "shape", ()))
+        raise DataError(
+            f"state: {what}: expected {like.dtype} of shape {shape}, found {kind} of shape {size}; restore what "
+            "state() returned"
         )

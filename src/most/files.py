@@ -1,7 +1,9 @@
 """Writing files so that a reader never sees half of one, and reading what may be none."""
 
 import os
+import struct
 import tempfile
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -11,7 +13,8 @@ from typing import IO, Any
 
 PARTIAL = ".part"
 NO_ARCHIVE = (  # all that numpy and zipfile stumble with over foreign bytes
-    OSError, EOFError, ValueError, KeyError, TypeError, RuntimeError, zipfile.BadZipFile, zlib.error,
+    OSError, EOFError, ValueError, KeyError, TypeError, RuntimeError, AttributeError, MemoryError, SyntaxError,
+    ArithmeticError, struct.error, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
 
 

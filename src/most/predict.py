@@ -62,7 +62,7 @@ def predict(config: PredictConfig) -> None:
 @hydra.main(version_base=None, config_path=str(conf_dir()), config_name="predict")
 def main(config: DictConfig) -> None:
     """Compose, check, predict."""
-    run(lambda: predict(typed(config)))
+    run(lambda: predict(typed(config)), goes_on=True)
 
 
 if __name__ == "__main__":

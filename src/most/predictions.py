@@ -48,7 +48,7 @@ def say_once(
 def read_prediction(files: LabelFiles, path: Path) -> Prediction:
     """Read back what ``write_prediction`` wrote; DataError where it is not there."""
     labels = files.read_prediction(path)
-    found = read_assignments(assignments_path(path))
+    found = read_assignments(assignments_path(path), files.taxonomy.num_classes)
     panoptic = Panoptic(files.taxonomy.decode(labels, path), files.taxonomy.instance_of(labels))
     return Prediction(panoptic, found.detections, found.roi, found.assigned)
 

@@ -52,7 +52,8 @@ def _write_frame(reader: Reader, frame: Frame, predictions: Path, out: Path, tra
     """Track one scan and write it, detections first: where labels are, all is."""
     source, path = reader.prediction_path(predictions, frame), reader.prediction_path(out, frame)
     sweep, labels = reader.sweep(frame), reader.read_prediction(source)
-    found = read_assignments(assignments_path(source)) if assignments_path(source).is_file() else None
+    beside, num_classes = assignments_path(source), reader.taxonomy.num_classes
+    found = read_assignments(beside, num_classes) if beside.is_file() else None
     segments = _observe(reader.taxonomy, sweep, labels, found, source)
     with named(f"{frame.sequence}, scan {frame.index}"):
         identities = tracker.step(segments.observations, sweep.pose, sweep.time)

@@ -149,7 +149,7 @@ class Observations(Rows):
     velocities: Float[Tensor, "segments 2"]  # relative to the ground, along the axes here, m/s
     velocity_known: Bool[Tensor, "segments"]
     scores: Float[Tensor, "segments"]  # in [0, 1]
-    placed: Bool[Tensor, "segments"]  # False where no point is finite: centre and extents say nothing then
+    placed: Bool[Tensor, "segments"]  # False where no point is somewhere: centre and extents say nothing then
 
 
 @dataclass

@@ -36,7 +36,7 @@ def track(config: TrackConfig) -> None:
 @hydra.main(version_base=None, config_path=str(conf_dir()), config_name="track")
 def main(config: DictConfig) -> None:
     """Compose, check, track."""
-    run(lambda: track(typed(config)))
+    run(lambda: track(typed(config)), goes_on=True)
 
 
 if __name__ == "__main__":

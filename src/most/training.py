@@ -28,6 +28,7 @@ from most.config import Config
 from most.datasets.class_counts import class_counts
 from most.datasets.datamodule import SweepDataModule
 from most.datasets.reader import Reader
+from most.errors import named
 from most.membership import PointSegMLP
 from most.stages.callbacks import Throughput
 from most.stages.checkpoints import AtomicCheckpointIO, LastCheckpoint
@@ -54,7 +55,10 @@ def build_detection(config: Config, data: SweepDataModule) -> DetectionStage:
     taxonomy, parts = data.reader.taxonomy, stage1_parts(config)
     network = build_network(parts, taxonomy)
     if config.weights is not None:
-        load_weights(network, "network", read_checkpoint(stage1_file(config, Path(config.weights)))["state_dict"])
+        path = stage1_file(config, Path(config.weights))
+        weights = read_checkpoint(path)["state_dict"]
+        with named(path):
+            load_weights(network, "network", weights)
     predictor = build_predictor(network, parts, taxonomy)
     training: DetectionTraining = training_of(config, "detection")
     balanced = training.losses.class_balance > 0

@@ -1,10 +1,11 @@
 """Points to voxels and back: the grid, the voxels a batch of windows occupies, and the voxel each point falls into.
 
 Every point of a scan gets a label, so no point is lost here: points above or below the grid are clipped into its
-border layer; points beyond its sides (or not finite) take no part in the network and read the label of the nearest
-voxel in the end (``nearest_voxel``).
+border layer; points beyond its sides, ``BEYOND`` above or below it, or not finite, take no part in the network and read
+the label of the nearest voxel in the end (``nearest_voxel``).
 """
 
+import math
 from dataclasses import dataclass, field
 
 import torch
@@ -14,6 +15,8 @@ from torch import Tensor
 
 from most.errors import ConfigError
 from most.structures import Sample, Voxels
+
+BEYOND = 50.0  # m above or below the grid; a stray point up there would outweigh all others in its voxel's means
 
 
 @dataclass(frozen=True)
@@ -37,8 +40,10 @@ class Grid:
         for name in ("voxel_size", "lower", "upper"):
             if len(getattr(self, name)) != 3:
                 raise ConfigError(f"grid.{name}: expected three numbers (x, y, z), found {getattr(self, name)}")
-        if min(self.voxel_size) <= 0:
+        if not all(0 < size < math.inf for size in self.voxel_size):
             raise ConfigError(f"grid.voxel_size: expected positive metres, found {self.voxel_size}")
+        if not all(map(math.isfinite, [*self.lower, *self.upper])):
+            raise ConfigError(f"grid.lower, grid.upper: expected metres, found {self.lower} and {self.upper}")
         if any(high <= low for low, high in zip(self.lower, self.upper, strict=True)):
             raise ConfigError(f"grid.upper: expected more than grid.lower {self.lower}, found {self.upper}")
 
@@ -57,10 +62,11 @@ class Grid:
         return BevGrid((x, y), cell, (-(-width // stride), -(-depth // stride)))
 
     def in_range(self, points: Float[Tensor, "points channels"]) -> Bool[Tensor, "points"]:
-        """Whether each point is finite in all channels and within the grid's sides (its height does not matter)."""
-        lower, upper = points.new_tensor(self.lower[:2]), points.new_tensor(self.upper[:2])
-        inside = (points[:, :2] >= lower) & (points[:, :2] < upper)
-        return inside.all(1) & points.isfinite().all(1)
+        """Whether each point is finite in all channels, within the grid's sides, and not ``BEYOND`` it in height."""
+        lower, upper = points.new_tensor(self.lower), points.new_tensor(self.upper)
+        inside = (points[:, :2] >= lower[:2]) & (points[:, :2] < upper[:2])
+        near = (points[:, 2] >= lower[2] - BEYOND) & (points[:, 2] <= upper[2] + BEYOND)
+        return inside.all(1) & near & points.isfinite().all(1)
 
     def cells(self, points: Float[Tensor, "points channels"]) -> Int64[Tensor, "points 3"]:
         """The voxel of each point in range; heights are clipped into the border layers."""

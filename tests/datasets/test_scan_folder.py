@@ -221,8 +221,15 @@ def test_poses_of_tum_bring_their_times(tmp_path):
         (IDENTITY + "1 2\n", r"poses\.txt, line 2: expected 12 finite"),
         (IDENTITY.replace("1", "2") * 2, r"poses\.txt: expected rotations"),
         ("0 0 0 0 0 0 0 0\n" * 2, r"poses\.txt: expected a quaternion .* row 0"),
-        ("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", r"poses\.txt, scan 1: expected a time after 2 s, found 1 s"),
-        ("1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", r"poses\.txt, scan 1: expected a time after 1 s, found 1 s"),
+        ("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", r"poses\.txt, line 2 \(scan 1, .* expected a time after 2 s, found 1 s"),
+        (
+            "# of a drive\n1695123456.25 0 0 0 0 0 0 1\n# twice\n1695123456.25 0 0 0 0 0 0 1\n",
+            r"poses\.txt, line 4 \(scan 1, .* expected a time after 1695123456.25 s, found 1695123456.25 s",
+        ),
+        (
+            "1695123456000000000 0 0 0 0 0 0 1\n1695123456100000000 0 0 0 0 0 0 1\n",
+            r"poses\.txt: expected seconds, found steps of 100000000 .* nanoseconds, divide them by 1e9",
+        ),
     ],
 )
 def test_poses_that_do_not_fit_are_refused(tmp_path, content, message):
@@ -243,6 +250,34 @@ def test_missing_poses_and_too_few_times_are_refused(tmp_path):
         pytest.raises(DataError, match=r"times\.txt: expected times of the 1 scans .* found 2"),
     ):
         ScanFolder(tmp_path, ScanFolderSettings(times=str(tmp_path / "times.txt")))
+
+
+def test_times_in_milliseconds_are_refused(tmp_path):
+    for name in "012":
+        write_bin(tmp_path / f"{name}.bin")
+    (tmp_path / "times.txt").write_text("0\n100\n200\n")
+    with (
+        pytest.warns(UserWarning, match="no poses"),
+        pytest.raises(DataError, match=r"times\.txt: expected seconds, found steps of 100 from scan to scan"),
+    ):
+        ScanFolder(tmp_path, ScanFolderSettings(times=str(tmp_path / "times.txt")))
+
+
+@pytest.mark.parametrize(
+    "names", [["0.1", "0.15", "0.2", "1.0"], ["9.5", "10", "10.25"], ["1700000000.05", "1700000000.5"], ["a2", "a10.1"]]
+)
+def test_names_that_are_times_are_ordered_by_value(tmp_path, names):
+    for name in reversed(names):
+        write_bin(tmp_path / f"{name}.bin")
+    assert [scan.name for scan in folder_of(tmp_path)] == names
+
+
+def test_a_cut_off_bin_is_told_of_before_any_scan_is_read(tmp_path):
+    for name in ("0.bin", "1.bin"):
+        write_bin(tmp_path / name)
+    (tmp_path / "1.bin").write_bytes(POINTS.tobytes()[:-1])
+    with pytest.raises(DataError, match=r"1\.bin: expected a multiple of 16 bytes"):
+        folder_of(tmp_path)
 
 
 def refuse(path: Path, message: str) -> None:
@@ -290,12 +325,29 @@ def test_arrays_that_are_no_scan_are_refused(tmp_path, array, message):
 
 
 @pytest.mark.parametrize("name", ["0.npy", "0.ply", "0.pcd"])
-@pytest.mark.parametrize("content", [b"", b"\n", b"no scan at all\n", b"ply\n\n", bytes(range(256))])
+@pytest.mark.parametrize("content", [b"", b"\n", b"no scan at all\n", b"ply\n\n", b"PK\3\4garbage", bytes(range(256))])
 def test_other_files_are_refused(tmp_path, name, content):
     if name.endswith("pcd"):
         pytest.importorskip("pypcd4", reason="reading .pcd takes the extra pcd")
     (tmp_path / name).write_bytes(content)
     refuse(tmp_path / name, "expected")
+
+
+@pytest.mark.parametrize("end", range(5, 45, 3))
+def test_an_ascii_ply_cut_off_anywhere_is_refused(tmp_path, end):
+    path = write(tmp_path / "c.ply")
+    path.write_bytes(path.read_bytes()[:-end])
+    refuse(path, "expected")
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [(b"'descr'", b"'descr"), (b"False", b"F(((("), (b"<f8", b"<f9"), (b"(3, 6)", b"(-3, 6)")]
+)
+def test_damaged_headers_of_arrays_are_refused(tmp_path, old, new):
+    content = write(path := tmp_path / "a.npy").read_bytes()
+    assert old in content
+    path.write_bytes(content.replace(old, new))
+    refuse(path, "expected an .npy array of numbers")
 
 
 def test_clouds_without_coordinates_are_refused(tmp_path):
@@ -331,7 +383,9 @@ def test_without_the_library_a_pcd_names_the_extra(tmp_path, monkeypatch):
         list(folder_of(tmp_path))
 
 
-@pytest.mark.parametrize("values", [{"columns": 2}, {"intensity_scale": 0.0}, {"period": float("nan")}])
+@pytest.mark.parametrize(
+    "values", [{"columns": 2}, {"intensity_scale": 0.0}, {"period": float("nan")}, {"period": 100.0}]
+)
 def test_settings_out_of_range_are_refused(values):
     with pytest.raises(ConfigError, match=f"scans.{next(iter(values))}: expected"):
         ScanFolderSettings(**values)

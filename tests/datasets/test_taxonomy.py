@@ -86,9 +86,10 @@ def test_no_points_are_fine(taxonomy: Taxonomy) -> None:
     assert taxonomy.to_training(none).shape == taxonomy.encode(none, none).shape == (0,)
 
 
-def test_unknown_name_lists_the_known() -> None:
-    with pytest.raises(ConfigError, match=r"expected one of .*semantickitti.*, found 'kitti'"):
-        Taxonomy.load("kitti")
+@pytest.mark.parametrize("name", ["kitti", "../taxonomies/nuscenes", "./nuscenes", ""])
+def test_unknown_name_lists_the_known(name: str) -> None:
+    with pytest.raises(ConfigError, match=rf"expected one of nuscenes, semantickitti, found '{name}'"):
+        Taxonomy.load(name)
 
 
 @pytest.mark.parametrize("path", sorted(TAXONOMIES.glob("*.yaml")), ids=lambda path: path.stem)

@@ -36,6 +36,12 @@ def test_past_points_are_moved_into_the_current_sensor_frame() -> None:
     assert window.dtype == torch.float32
 
 
+def test_sweeps_before_a_long_pause_are_left_out() -> None:
+    current = sweep(60, [[1, 2, 3, 0.5]])
+    window = gather_window(current, [sweep(10, [[1, 1, 1, 0.5]]), sweep(9, [[2, 2, 2, 0.5]])])
+    assert window[:, 4].tolist() == [0, -5]
+
+
 def test_current_points_stay_as_they_are_whatever_they_are() -> None:
     current = sweep(0, [[math.nan, 1, math.inf, 0.1], [2, 2, 2, 0.2]], 3 * torch.eye(4, dtype=torch.float64))
     window = gather_window(current, [])

@@ -1,5 +1,6 @@
 """Velocities that centres tell, and the filter, which is held against the textbook's matrices in float64."""
 
+import pytest
 import torch
 from scenes import seen, tracker
 
@@ -58,3 +59,27 @@ def test_the_filter_learns_a_velocity_that_nobody_observes():
     for index in range(20):
         following.step(seen((0.3 * index, 0)), None, 0.1 * index)
     assert torch.allclose(following.tracks().velocities, torch.tensor([[3.0, 0.0]]), atol=0.1)
+
+
+@pytest.mark.parametrize("settings", [TrackerSettings(), TrackerSettings(assignment="hungarian")])
+@pytest.mark.parametrize("since", [1e-310, 1e-9, 1e-3])
+def test_two_sightings_at_nearly_one_time_tell_no_absurd_velocity(settings, since):
+    following = tracker(settings)
+    numbers = [following.step(seen((x, 0)), None, time).tolist() for x, time in ((0, 0.0), (0.2, since))]
+    assert torch.allclose(following.tracks().velocities, torch.tensor([[4.0, 0.0]]))  # as if 0.05 s had passed
+    assert [*numbers, following.step(seen((0.1, 0)), None, 0.1).tolist()] == [[1]] * 3
+
+
+def test_at_ten_scans_a_second_velocities_are_ways_over_times():
+    following = tracker()
+    for x, time in ((0, 0.0), (0.3, 0.1)):
+        following.step(seen((x, 0)), None, time)
+    assert torch.equal(following.tracks().velocities, (torch.tensor([[0.3, 0.0]]).double() / 0.1).float())
+
+
+def test_poses_beyond_all_measure_are_no_crash():
+    following = tracker(TrackerSettings(assignment="hungarian"))
+    for index, x in enumerate((0, 1e300, 1e308, -1e308)):
+        pose = torch.eye(4, dtype=torch.float64)
+        pose[0, 3] = x
+        assert len(following.step(seen((10, 0)), pose, 0.1 * index)) == 1

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Float32, Float64
+from jaxtyping import Bool, Float32, Float64
 from torch import Tensor
 
 from most.errors import DataError
@@ -50,15 +50,20 @@ def read_poses(folder: Path) -> Float64[Tensor, "rows 4 4"]:
     return invert(camera_from_lidar) @ camera @ camera_from_lidar
 
 
-def check_rigid(where: str, poses: Float64[Tensor, "rows 4 4"]) -> None:
-    """Raise a DataError unless each matrix turns without scaling, shearing or mirroring, to the digits files carry."""
-    rotation = poses[:, :3, :3]
-    off = (rotation @ rotation.mT - torch.eye(3, dtype=torch.float64)).abs().amax((1, 2))
-    if bad := ((off > RIGID) | (torch.linalg.det(rotation) < 0)).nonzero().flatten().tolist():
+def check_rigid(where: str, poses: Float64[Tensor, "rows 4 4"], advice: str = "is this the official file?") -> None:
+    """Raise a DataError unless each matrix of a file is rigid."""
+    if bad := (~are_rigid(poses)).nonzero().flatten().tolist():
         raise DataError(
             f"{where}: expected rotations in the first three columns of each row's 3 x 4 matrix, "
-            f"found none in row {bad[0]} and {len(bad) - 1} more; is this the official file?"
+            f"found none in row {bad[0]} and {len(bad) - 1} more; {advice}"
         )
+
+
+def are_rigid(poses: Float64[Tensor, "rows 4 4"]) -> Bool[Tensor, "rows"]:
+    """Whether each matrix turns without scaling, shearing or mirroring, to the digits that files carry."""
+    rotation = poses[:, :3, :3]
+    off = (rotation @ rotation.mT - torch.eye(3, dtype=torch.float64)).abs().amax((1, 2))
+    return (off <= RIGID) & (torch.linalg.det(rotation) >= 0)
 
 
 def read_rows(path: Path, columns: int) -> Float64[Tensor, "rows columns"]:
@@ -74,8 +79,8 @@ def read_times(path: Path) -> Float64[Tensor, "rows"]:
     times = read_rows(path, 1)[:, 0]
     if late := (times.diff() <= 0).nonzero().flatten().tolist():
         raise DataError(
-            f"{path}, line {late[0] + 2}: expected a time after {times[late[0]]:g} s, found {times[late[0] + 1]:g} s; "
-            "a scan is listed twice, or the file is another's: copy it again"
+            f"{path}, line {late[0] + 2}: expected a time after {times[late[0]]:.15g} s, found "
+            f"{times[late[0] + 1]:.15g} s; a scan is listed twice, or the file is another's: copy it again"
         )
     return times
 

@@ -21,7 +21,7 @@ def read_pose_file(path: Path) -> tuple[Float64[Tensor, "rows 4 4"], Float64[Ten
     """
     if not path.is_file():
         raise DataError(f"{path}: expected a file of poses, found none")
-    lines = [(number, line.split()) for number, line in enumerate(read_lines(path), 1) if line.lstrip()[:1] != "#"]
+    lines = numbered_rows(path)
     width = len(lines[0][1]) if lines else POSE_NUMBERS
     if width not in (POSE_NUMBERS, TUM_NUMBERS):
         raise DataError(
@@ -31,8 +31,13 @@ def read_pose_file(path: Path) -> tuple[Float64[Tensor, "rows 4 4"], Float64[Ten
     rows = [parse_row(f"{path}, line {number}", words, width) for number, words in lines]
     table = torch.tensor(rows, dtype=torch.float64).reshape(-1, width)
     poses, times = (_from_tum(path, table), table[:, 0]) if width == TUM_NUMBERS else (_from_matrices(table), None)
-    check_rigid(str(path), poses)
+    check_rigid(str(path), poses, "is it a file of poses, world from sensor?")
     return poses, times
+
+
+def numbered_rows(path: Path) -> list[tuple[int, list[str]]]:
+    """Return the words of each row of a text file, and the line where it stands; comments are none."""
+    return [(number, line.split()) for number, line in enumerate(read_lines(path), 1) if line.lstrip()[:1] != "#"]
 
 
 def _from_matrices(table: Float64[Tensor, "rows 12"]) -> Float64[Tensor, "rows 4 4"]:

@@ -34,24 +34,28 @@ def read_scan_file(path: Path, columns: int) -> Float32[Tensor, "points 4"]:
     return torch.from_numpy(points)
 
 
-def _read_bin(path: Path, columns: int) -> Num[np.ndarray, "points columns"]:
-    """Read rows of float32; the file's size alone tells whether ``columns`` is right, so it is not guessed."""
-    content = path.read_bytes()
-    if len(content) % (columns * FLOAT.itemsize):
-        fitting = [str(width) for width in range(3, 9) if len(content) % (width * FLOAT.itemsize) == 0]
+def check_size(path: Path, columns: int) -> None:
+    """Refuse a ``.bin`` whose size is no whole number of points; whether ``columns`` is right, nothing else tells."""
+    size, row = path.stat().st_size, columns * FLOAT.itemsize
+    if path.suffix.lower() == ".bin" and size % row:
+        fitting = [str(width) for width in range(3, 9) if size % (width * FLOAT.itemsize) == 0]
         advice = f"give scans.columns={' or '.join(fitting)}" if fitting else "the file is cut off: copy it again"
         raise DataError(
-            f"{path}: expected a multiple of {columns * FLOAT.itemsize} bytes ({columns} float32 a point), "
-            f"found {len(content)}; {advice}"
+            f"{path}: expected a multiple of {row} bytes ({columns} float32 a point), found {size}; {advice}"
         )
-    return np.frombuffer(content, FLOAT).reshape(-1, columns)
+
+
+def _read_bin(path: Path, columns: int) -> Num[np.ndarray, "points columns"]:
+    """Read rows of float32."""
+    check_size(path, columns)
+    return np.frombuffer(path.read_bytes(), FLOAT).reshape(-1, columns)
 
 
 def _read_npy(path: Path) -> Num[np.ndarray, "points columns"]:
     """Read an array with a row for each point."""
     try:
         array = np.load(path, allow_pickle=False)
-    except (ValueError, EOFError, OSError, MemoryError) as error:
+    except Exception as error:  # a foreign header is parsed as Python, and fails in all of its ways
         raise DataError(f"{path}: expected an .npy array of numbers, found none readable ({error})") from error
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
         found = array.dtype if isinstance(array, np.ndarray) else "an archive"
@@ -64,18 +68,16 @@ def _read_npy(path: Path) -> Num[np.ndarray, "points columns"]:
 def _read_ply(path: Path) -> Num[np.ndarray, "points columns"]:
     """Read the vertices of a PLY file."""
     with path.open("rb") as file:
-        vertex = _parse(path, "PLY", file, _vertices)
-    count, fields = vertex["length"], vertex.get("data")
-    if not count:
-        return np.zeros((0, 4), np.float32)
-    names = fields.dtype.names if isinstance(fields, np.ndarray) else fields
-    return _columns(path, {} if fields is None else {name: fields[name] for name in names}, count)
+        count, fields = _parse(path, "PLY", file, _vertices)
+    return _columns(path, fields, count) if count else np.zeros((0, 4), np.float32)
 
 
-def _vertices(file: IO[bytes]) -> Mapping:
-    """The raw element ``vertex``, which trimesh hands on beside the mesh it would make."""
+def _vertices(file: IO[bytes]) -> tuple[int, dict[str, np.ndarray]]:
+    """How many there are, and the fields of the raw element, which trimesh hands on beside the mesh it would make."""
     vertex: Mapping = load_ply(file, fix_texture=False, skip_materials=True)["metadata"]["_ply_raw"]["vertex"]
-    return vertex
+    fields = vertex.get("data", {})
+    names = fields.dtype.names if isinstance(fields, np.ndarray) else fields
+    return vertex["length"], {name: np.asarray(fields[name]) for name in names}
 
 
 def _read_pcd(path: Path) -> Num[np.ndarray, "points columns"]:
@@ -107,7 +109,7 @@ def _columns(path: Path, fields: Mapping[str, np.ndarray], count: int) -> Num[np
     if missing := [axis for axis in "xyz" if axis not in named]:
         raise DataError(f"{path}: expected fields x, y and z, found no {', '.join(missing)} in {', '.join(named)}")
     chosen = [*"xyz", *[name for name in INTENSITY if name in named][:1]]
-    if short := [name for name in chosen if len(named[name]) != count]:
+    if short := [name for name in chosen if len(named[name]) != count or named[name].dtype.kind not in "fiu"]:
         raise DataError(
             f"{path}: expected the {count} points that its header tells of, found {len(named[short[0]])}; "
             "the file is cut off: copy it again"

@@ -1,20 +1,22 @@
 """A plain folder of scans, of any sensor, that belongs to no dataset: what a stream of sweeps is read from."""
 
-import math
 import re
 import warnings
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 
 import torch
 from jaxtyping import Float32, Float64
 from torch import Tensor
 
+from most.datasets.intensities import IntensityScale
 from most.datasets.kitti_files import read_rows
 from most.datasets.pose_files import read_pose_file
-from most.datasets.scan_files import SUFFIXES, read_scan_file
+from most.datasets.scan_files import SUFFIXES, check_size, read_scan_file
+from most.datasets.scan_times import LONGEST_STEP, check_times
 from most.errors import ConfigError, DataError
 
 
@@ -31,9 +33,13 @@ class ScanFolderSettings:
     def __post_init__(self) -> None:
         if self.columns < 3:
             raise ConfigError(f"scans.columns: expected at least 3 (x, y, z), found {self.columns}")
-        for key in ("intensity_scale", "period"):
-            if not 0 < getattr(self, key) < math.inf:
-                raise ConfigError(f"scans.{key}: expected a number > 0, found {getattr(self, key)}")
+        if not 0 < self.period <= LONGEST_STEP:
+            raise ConfigError(f"scans.period: expected seconds above 0, {LONGEST_STEP:g} at most, found {self.period}")
+        self.intensities()
+
+    def intensities(self) -> IntensityScale:
+        """Make what brings the files' intensities to [0, 1]."""
+        return IntensityScale(self.intensity_scale, "scans.intensity_scale")
 
 
 @dataclass
@@ -47,17 +53,20 @@ class Scan:
 
 
 class ScanFolder:
-    """The scans of a folder in the natural order of their names (2 before 10); each is read when its turn comes.
+    """The scans of a folder in the order of the numbers in their names (2 before 10); each is read when its turn comes.
 
     ``poses`` is None where the settings name no file; a warning then says what follows from it. DataErrors name the
-    file at fault: those of the folder, poses and times are raised here, those of a scan when it is read.
+    file at fault: those of the folder, poses, times and sizes of ``.bin`` files are raised here, others of a scan when
+    it is read.
     """
 
     def __init__(self, folder: str | Path, settings: ScanFolderSettings | None = None) -> None:
         self.folder, self.settings = Path(folder).expanduser(), settings or ScanFolderSettings()
         self.paths = list_scans(self.folder)
         self.poses, self.times = self._read_poses()
-        self._brightest = 1.0  # of what was read so far, before it was cut off
+        for path in self.paths:
+            check_size(path, self.settings.columns)
+        self._intensities = self.settings.intensities()
 
     def __len__(self) -> int:
         return len(self.paths)
@@ -66,25 +75,12 @@ class ScanFolder:
         """Read one scan."""
         path, pose = self.paths[index], None if self.poses is None else self.poses[index]
         points = read_scan_file(path, self.settings.columns)
-        points[:, 3] = self._scale(points[:, 3], path)
+        points[:, 3] = self._intensities.repair(points[:, 3], path)
         return Scan(path.stem, points, pose, float(self.times[index]))
 
     def __iter__(self) -> Iterator[Scan]:
         """Read one scan after the other."""
         return (self[index] for index in range(len(self)))
-
-    def _scale(self, intensity: Float32[Tensor, "points"], path: Path) -> Float32[Tensor, "points"]:
-        """Bring intensities to [0, 1]; those that are not finite become 0, and too bright ones are told of once."""
-        scaled = (intensity / self.settings.intensity_scale).nan_to_num(0.0, 0.0, 0.0)
-        brightest = float(scaled.max()) if len(scaled) else 0.0
-        if self._brightest <= 1 < brightest:
-            self._brightest = brightest
-            warnings.warn(
-                f"{path}: expected intensities up to scans.intensity_scale={self.settings.intensity_scale:g}, found "
-                f"{brightest * self.settings.intensity_scale:g}; brighter ones count as 1: give the sensor's highest",
-                stacklevel=3,
-            )
-        return scaled.clamp(0, 1)
 
     def _read_poses(self) -> tuple[Float64[Tensor, "scans 4 4"] | None, Float64[Tensor, "scans"]]:
         """Read poses and times; the file of times goes before those that stand beside the poses."""
@@ -102,12 +98,8 @@ class ScanFolder:
         if self.settings.times is not None:
             times = read_rows(Path(self.settings.times), 1)[:, 0]
             self._check_count(self.settings.times, len(times), "times")
-        if late := (times[1:] <= times[:-1]).nonzero().flatten().tolist():
-            file, row = self.settings.times or self.settings.poses, late[0] + 1
-            raise DataError(
-                f"{file}, scan {row}: expected a time after {times[row - 1]:g} s, found {times[row]:g} s; give each "
-                "scan its own time, in seconds"
-            )
+        if (file := self.settings.times or self.settings.poses) is not None:
+            check_times(Path(file), times)
         return poses, times
 
     def _check_count(self, file: str, found: int, what: str) -> None:
@@ -120,13 +112,19 @@ def list_scans(folder: Path) -> list[Path]:
     if not folder.is_dir():
         raise DataError(f"{folder}: expected a folder of scans, found none")
     files = [path for path in folder.iterdir() if path.is_file() and not path.name.startswith(".")]
-    scans = sorted((path for path in files if path.suffix.lower() in SUFFIXES), key=natural)
+    scans = in_order([path for path in files if path.suffix.lower() in SUFFIXES])
     if not scans:
         suffixes = ", ".join(sorted({path.suffix or path.name for path in files})[:8]) or "no files"
         raise DataError(f"{folder}: expected scans ({', '.join(SUFFIXES)}), found {suffixes}")
     if twice := [stem for stem, number in Counter(path.stem for path in scans).items() if number > 1]:
         raise DataError(f"{folder}: expected one scan of each name, found several {twice[0]}.*; move all but one away")
     return scans
+
+
+def in_order(paths: list[Path]) -> list[Path]:
+    """Sort by name: by value where all names are decimal numbers, as times are (0.15 before 0.2), else naturally."""
+    times = all(re.fullmatch(r"\d+(\.\d+)?", path.stem) for path in paths)
+    return sorted(paths, key=(lambda path: (Decimal(path.stem), path.name)) if times else natural)
 
 
 def natural(path: Path) -> tuple[list[str | int], str]:

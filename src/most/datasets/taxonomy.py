@@ -84,11 +84,10 @@ class Taxonomy:
     @staticmethod
     def load(name: str) -> "Taxonomy":
         """Read the taxonomy of that name that comes with the package; a ConfigError lists the names there are."""
-        path = TAXONOMIES / f"{name}.yaml"
-        if not path.is_file():
-            known = ", ".join(sorted(file.stem for file in TAXONOMIES.glob("*.yaml")))
-            raise ConfigError(f"taxonomy: expected one of {known}, found {name!r}")
-        return Taxonomy.read(path)
+        known = sorted(file.stem for file in TAXONOMIES.glob("*.yaml"))
+        if name not in known:  # a checkpoint's name must not lead to other folders
+            raise ConfigError(f"taxonomy: expected one of {', '.join(known)}, found {name!r}")
+        return Taxonomy.read(TAXONOMIES / f"{name}.yaml")
 
     @staticmethod
     def read(path: Path) -> "Taxonomy":

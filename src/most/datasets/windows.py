@@ -10,8 +10,12 @@ from jaxtyping import Float32
 from torch import Tensor
 
 from most.datasets.reader import Frame
+from most.errors import DataError, check_kept
 from most.geometry.poses import relative, transform
 from most.structures import OnDevice, Sample, Sweep
+
+OLDEST = 5.0  # s; sweeps before a longer pause say nothing of now, and networks learned from no such ages
+CLOCK = 1e-3  # s by which times of sweeps are off
 
 
 @dataclass
@@ -47,11 +51,24 @@ class SlidingWindow:
     def state(self) -> dict[str, Any]:
         """Return the sweeps that are kept, without labels, the latest first, in plain types and tensors."""
         sweeps = [vars(replace(sweep, labels=None)) for sweep in self._before]
-        return {"sweeps": sweeps}
+        return {"previous": self.previous, "sweeps": sweeps}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Go on from what ``state`` returned."""
-        self._before = deque((Sweep(**sweep) for sweep in state["sweeps"]), self.previous)
+        """Go on from what ``state`` returned; a DataError for what another number of sweeps kept changes nothing."""
+        if state["previous"] != self.previous:
+            raise DataError(
+                f"state: expected one of a model with {self.previous} previous sweeps, found one with "
+                f"{state['previous']}; restore it to the model that it came from"
+            )
+        self._before = deque(map(_kept_sweep, state["sweeps"]), self.previous)
+
+
+def _kept_sweep(kept: Mapping[str, Any]) -> Sweep:
+    """Read a sweep of a state; a DataError where it is none."""
+    points, pose = kept["points"], kept["pose"]
+    check_kept("points", points, torch.zeros(0, 4), len(points))
+    check_kept("pose", pose, torch.eye(4, dtype=torch.float64), 4)
+    return Sweep(str(kept["sequence"]), int(kept["index"]), points, pose, float(kept["time"]), None)
 
 
 def previous_frames(frames: list[Frame], current: Frame, count: int) -> list[Frame]:
@@ -63,10 +80,13 @@ def previous_frames(frames: list[Frame], current: Frame, count: int) -> list[Fra
 def gather_window(current: Sweep, previous: list[Sweep]) -> Float32[Tensor, "points 5"]:
     """x, y, z (m, current sensor frame), intensity and time (s, relative, <= 0); the current sweep's points first.
 
+    Previous sweeps that are more than ``OLDEST`` seconds old are left out.
     The current points keep the order of their file, non-finite ones included: each of them needs a label.
     """
     parts = [with_age(current.points, 0.0)]
     for sweep in previous:
+        if current.time - sweep.time > OLDEST + CLOCK:
+            continue
         moved = transform(relative(current.pose, sweep.pose), sweep.points[:, :3])
         parts.append(with_age(torch.cat([moved, sweep.points[:, 3:]], dim=1), sweep.time - current.time))
     return torch.cat(parts)

@@ -6,7 +6,6 @@ the point, -1 for none.
 """
 
 import zipfile
-import zlib
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -16,11 +15,12 @@ from jaxtyping import Float, Int64
 from torch import Tensor
 
 from most.errors import DataError
-from most.files import atomic_write
+from most.files import NO_ARCHIVE, atomic_write
 from most.structures import Detections
 
 WIDTHS = {"classes": (), "scores": (), "centres": (3,), "extents": (3,), "velocities": (2,), "roi": (3,), "yaws": ()}
 OPTIONAL = ("yaws",)
+WHOLE = ("classes", "assigned")
 
 
 @dataclass
@@ -50,21 +50,44 @@ def write_assignments(path: Path, assignments: Assignments) -> None:
         )
 
 
-def read_assignments(path: Path) -> Assignments:
-    """Read one sweep's assignments; raises DataError for a file that does not hold them."""
+def read_assignments(path: Path, num_classes: int | None = None) -> Assignments:
+    """Read one sweep's assignments; raises DataError for a file that does not hold them.
+
+    ``num_classes`` of the taxonomy that the file's classes are training ids of; None takes any.
+    """
     arrays = _arrays(path)
-    count = len(arrays["classes"])
-    widths = {name: width for name, width in WIDTHS.items() if name in arrays}
-    for name, width in widths.items():
-        if arrays[name].shape != (count, *width):
-            raise DataError(f"{path}: {name}: expected shape {(count, *width)}, found {arrays[name].shape}")
-    assigned = arrays["assigned"]
-    if assigned.ndim != 1 or (assigned.size and not -1 <= assigned.min() <= assigned.max() < count):
-        raise DataError(f"{path}: assigned: expected for each point a number from -1 to {count - 1}, found others")
-    tensors = {name: torch.from_numpy(arrays[name].astype(np.float32)) for name in widths if name != "classes"}
+    count = arrays["classes"].size
+    for name, width in WIDTHS.items():
+        if name in arrays:
+            _check_numbers(f"{path}: {name}", arrays[name], (count, *width), name)
+    _check_ids(f"{path}: classes: expected class ids", arrays["classes"], 0, num_classes)
+    if arrays["assigned"].ndim != 1:
+        raise DataError(f"{path}: assigned: expected a number for each point, found shape {arrays['assigned'].shape}")
+    _check_ids(f"{path}: assigned: expected for each point a number", arrays["assigned"], -1, count)
+    numbers = {name: array for name, array in arrays.items() if name not in WHOLE}
+    tensors = {name: torch.from_numpy(array.astype(np.float32)) for name, array in numbers.items()}
     roi = tensors.pop("roi")
-    classes = torch.from_numpy(arrays["classes"].astype(np.int64))
-    return Assignments(Detections(classes, **tensors), roi, torch.from_numpy(assigned.astype(np.int64)))
+    classes, assigned = (torch.from_numpy(arrays[name].astype(np.int64)) for name in WHOLE)
+    return Assignments(Detections(classes, **tensors), roi, assigned)
+
+
+def _check_numbers(where: str, array: np.ndarray, shape: tuple[int, ...], name: str) -> None:
+    """Refuse an array of another shape or kind; only velocities may be unknown."""
+    if array.shape != shape:
+        raise DataError(f"{where}: expected shape {shape}, found {array.shape}")
+    if array.dtype.kind not in ("iu" if name in WHOLE else "fiu"):
+        raise DataError(f"{where}: expected {'whole ' * (name in WHOLE)}numbers, found {array.dtype}")
+    if name != "velocities" and not np.isfinite(array.astype(np.float32)).all():
+        raise DataError(f"{where}: expected finite numbers, found others; predict the scan again")
+
+
+def _check_ids(what: str, ids: np.ndarray, first: int, end: int | None) -> None:
+    """Refuse what are no whole numbers, or are out of range."""
+    last = "on" if end is None else f"to {end - 1}"
+    if ids.dtype.kind not in "iu":
+        raise DataError(f"{what} from {first} {last}, found {ids.dtype}")
+    if ids.size and (ids.min() < first or (end is not None and ids.max() >= end)):
+        raise DataError(f"{what} from {first} {last}, found {ids.min()} to {ids.max()}")
 
 
 def _arrays(path: Path) -> dict[str, np.ndarray]:
@@ -75,6 +98,6 @@ def _arrays(path: Path) -> dict[str, np.ndarray]:
         if missing:
             raise DataError(f"{path}: expected arrays {', '.join(names)}, found no {', '.join(missing)}")
         with np.load(path, allow_pickle=False) as arrays:
-            return {name: arrays[name] for name in arrays.files if name in (*names, *OPTIONAL)}
-    except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, OSError) as error:
+            return {name: np.asarray(arrays[name]) for name in arrays.files if name in (*names, *OPTIONAL)}
+    except NO_ARCHIVE as error:
         raise DataError(f"{path}: expected an .npz file of detections, found none readable ({error})") from error

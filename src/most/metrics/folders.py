@@ -126,7 +126,7 @@ def _memberships(
     taxonomy: Taxonomy,
 ) -> MembershipCounts:
     """Score the memberships of one scan, written to ``path``."""
-    found = read_assignments(path)
+    found = read_assignments(path, taxonomy.num_classes)
     check_entries(path, len(found.assigned), len(points), "an entry")
     instances = find_instances(points, truth, truth_semantics, taxonomy)
     return membership_counts(

@@ -115,7 +115,8 @@ def _same_segments(one: Int64[Tensor, "points"], other: Int64[Tensor, "points"])
 
 
 def _errors(reader: Reader, frame: Frame, truth: Instances, folder: Path) -> VelocityErrors:
-    found = read_assignments(assignments_path(reader.prediction_path(folder, frame)))
+    beside = assignments_path(reader.prediction_path(folder, frame))
+    found = read_assignments(beside, reader.taxonomy.num_classes)
     return velocity_errors(found.detections, found.roi, truth)
 
 

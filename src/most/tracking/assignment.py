@@ -44,7 +44,7 @@ def hungarian(
     scores: Float[np.ndarray, "segments"],
 ) -> Pairs:
     """The pairs of least total distance, in gates; to leave a pair apart costs one gate. Scores do not matter."""
-    cost = np.minimum(distance / gates, 1.0)
+    cost = np.fmin(distance / gates, 1.0)  # also where a distance is too large to be a number
     rows, columns = linear_sum_assignment(cost)
     return [
         (int(row), int(column))

@@ -1,12 +1,15 @@
 """What a tracker works with: observations and live tracks, both in the world, in float64."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
+from most.errors import check_kept
 from most.geometry.poses import invert, transform
 from most.structures import Observations, Rows, Tracks
 
@@ -55,6 +58,14 @@ class Live(Rows):
         whole, real = torch.zeros(0, dtype=torch.int64), torch.zeros(0, dtype=torch.float64)
         rows, kept = torch.zeros(0, 3, dtype=torch.float64), torch.zeros(0, memory, dtype=torch.float64)
         return Live(whole, whole, rows, rows, rows.float(), whole, real, real, kept)
+
+    @staticmethod
+    def kept(state: Mapping[str, Any], memory: int) -> "Live":
+        """Read the tracks that a state holds; a DataError where they are none, or of another model of motion."""
+        like, numbers = Live.none(memory), state["numbers"]
+        for name, column in vars(like).items():
+            check_kept(name, state[name], column, len(numbers))
+        return Live(**{name: state[name].clone() for name in vars(like)})
 
     def in_sensor(self, pose: Float64[Tensor, "4 4"], time: float) -> Tracks:
         """Return where the tracks are expected at a time, in the frame of a sensor (world_from_sensor)."""

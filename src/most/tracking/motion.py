@@ -16,6 +16,7 @@ from most.errors import ConfigError
 from most.tracking.live import Live, Sightings
 
 SETTLE = 0.5  # s over which velocities told by centres are averaged, since modal centres jump as the view changes
+SHORTEST = 0.05  # s; centres jump, so what they do in less would tell absurd velocities: it is divided by this instead
 FASTEST = 10.0  # m/s, standard deviation of a velocity that nothing tells yet
 
 
@@ -61,7 +62,7 @@ class LastVelocity:
         self, tracks: Live, seen: Sightings, since: Float64[Tensor, "tracks"]
     ) -> tuple[Float64[Tensor, "tracks 3"], Float64[Tensor, "tracks 3"], Float64[Tensor, "tracks 0"]]:
         """Return the new centres with their velocities; those that the centres tell settle exponentially."""
-        told = (seen.centres - tracks.centres) / since[:, None]
+        told = (seen.centres - tracks.centres) / since.clamp(min=SHORTEST)[:, None]
         weight = torch.where(tracks.hits == 1, 1.0, 1 - torch.exp(-since / SETTLE))
         settled = tracks.velocities + weight[:, None] * (told - tracks.velocities)
         return seen.centres, _known_or(seen, settled), tracks.memory

@@ -2,12 +2,13 @@
 
 from collections import deque
 from collections.abc import Iterable
+from typing import Any
 
 import torch
 from jaxtyping import Int64
 from torch import Tensor
 
-from most.errors import DataError
+from most.errors import DataError, check_kept
 
 State = tuple[Int64[Tensor, "kinds 2"], Int64[Tensor, "free 2"]]
 
@@ -47,8 +48,10 @@ class Numbers:
         free = [(kind, number) for kind, numbers in sorted(self._free.items()) for number in numbers]
         return _table(given), _table(free)
 
-    def restore(self, state: State) -> None:
-        """Go on from ``state``."""
+    def restore(self, state: tuple[Any, Any]) -> None:
+        """Go on from ``state``; a DataError for what is none, or another dataset's, changes nothing."""
+        for name, table in zip(("given", "free"), state, strict=True):
+            check_kept(name, table, _table([]), len(table))
         given, free = state[0].tolist(), state[1].tolist()
         if any(number > self.largest for _, number in given):
             raise DataError(f"tracks: expected numbers up to {self.largest}, found larger; they are of another dataset")

@@ -10,6 +10,9 @@ from most.geometry.boxes import bounds
 from most.geometry.segments import measure
 from most.structures import Detections, Observations, OnDevice, Panoptic
 
+FARTHEST = (
+    1e3  # m; no car's lidar reaches there: a point beyond says as little of where its segment is as one at infinity
+)
 UNDETECTED = 0.0  # score of a segment that no detection claims: any detection chooses its track before it
 
 
@@ -61,8 +64,8 @@ def _segments(panoptic: Panoptic, things: list[int]) -> tuple[Int64[Tensor, "seg
 def _by_points(
     points: Float[Tensor, "points 3"], classes: Int64[Tensor, "segments"], rows: Int64[Tensor, "points"]
 ) -> Observations:
-    """Observe segments by their finite points; one that has none is nowhere."""
-    own = (rows >= 0) & points.isfinite().all(1)
+    """Observe segments by their points that are somewhere; one that has none is nowhere."""
+    own = (rows >= 0) & (points.abs() <= FARTHEST).all(1)
     count = len(classes)
     centres, extents = measure(points[own], rows[own], count)
     return Observations(

@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields
 
 import torch
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
-from most.errors import DataError
+from most.errors import DataError, check_kept
 from most.structures import Observations, Tracks
 from most.tracking.assignment import Assignment
 from most.tracking.live import Live, Sightings, canonical_order
@@ -72,12 +71,19 @@ class Tracker:
         return live | {"pose": self._pose.clone(), "time": clock, "given": given, "free": free}
 
     def restore(self, state: Mapping[str, Tensor]) -> None:
-        """Go on from the ``state`` of a tracker of the same settings."""
-        if state["memory"].shape[1] != self.motion.memory:
+        """Go on from the ``state`` of a tracker of the same settings; a DataError for another's changes nothing."""
+        if state["memory"].shape[1:] != (self.motion.memory,):
             raise DataError("tracks: expected the state of a tracker of the same motion, found another's")
+        live, pose, time = Live.kept(state, self.motion.memory), state["pose"], float(state["time"])
+        check_kept("pose", pose, self._pose, 4)
+        if math.isnan(time) or not bool(pose.isfinite().all()):
+            raise DataError(f"state: expected a finite pose and a time, found {pose.tolist()} at {time} s")
+        if len(live) and not 0 <= int(live.classes.min()) <= int(live.classes.max()) < len(self.gates):
+            raise DataError(
+                f"tracks: expected classes up to {len(self.gates) - 1}, found others; they are of another dataset"
+            )
         self._numbers.restore((state["given"], state["free"]))
-        self._live = Live(**{field.name: state[field.name].clone() for field in fields(Live)})
-        self._pose, self._time = state["pose"].clone(), float(state["time"])
+        self._live, self._pose, self._time = live, pose.clone(), time
 
     def check(self, pose: Float64[Tensor, "4 4"] | None, time: float) -> None:
         """Raise the DataError that ``step`` would, were it told this pose and time next."""

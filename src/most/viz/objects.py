@@ -40,7 +40,7 @@ def predicted_objects(
     """The detections that lie beside the prediction ``path``; without them, the boxes about its instances' points."""
     beside = assignments_path(path)
     if beside.is_file():
-        found = read_assignments(beside)
+        found = read_assignments(beside, reader.taxonomy.num_classes)
         check_entries(beside, len(found.assigned), len(labels), "an entry")
         return _of_detections(found.detections, claimed_segments(found, segments))
     rules = _rules(reader, lambda raw: reader.taxonomy.decode(raw, path))
