@@ -311,12 +311,12 @@ def test_times_in_other_units_are_told_of_once(model, recwarn):
 
 def test_after_a_pause_the_window_begins_anew(model):
     model.step(scan(0), lidar_pose(0), 0.0)
-    late = model.step(scan(1), lidar_pose(1), 5.1)
+    late = model.step(scan(1), lidar_pose(1), 10.1)
     model.begin()
     assert torch.equal(model.step(scan(1), lidar_pose(1), 0.0).confidence, late.confidence)
     model.begin()
     model.step(scan(0), lidar_pose(0), 0.0)
-    assert not torch.equal(model.step(scan(1), lidar_pose(1), 5.0).confidence, late.confidence)
+    assert not torch.equal(model.step(scan(1), lidar_pose(1), 9.9).confidence, late.confidence)
 
 
 def test_a_sweep_without_a_pose_fills_no_window(model):

@@ -126,7 +126,7 @@ class PanopticTracker:
         Points that are not finite, and scans without any, are no error; intensities that are not finite count as 0.
         ``pose``: world_from_sensor, 4 x 4. Without it earlier sweeps are left out of the window, as they would smear
         (a warning says so), and the sensor is taken to stand still.
-        ``timestamp``: s, on any clock; by default a tenth of a second after the last. Sweeps of more than five seconds
+        ``timestamp``: s, on any clock; by default a tenth of a second after the last. Sweeps of more than ten seconds
         before are left out of the window, and what was followed is lost after ``lost_after`` of the settings.
 
         A scan that comes late or is of another shape is a DataError that changes nothing: leave it out and go on.

@@ -37,9 +37,9 @@ def test_past_points_are_moved_into_the_current_sensor_frame() -> None:
 
 
 def test_sweeps_before_a_long_pause_are_left_out() -> None:
-    current = sweep(60, [[1, 2, 3, 0.5]])
-    window = gather_window(current, [sweep(10, [[1, 1, 1, 0.5]]), sweep(9, [[2, 2, 2, 0.5]])])
-    assert window[:, 4].tolist() == [0, -5]
+    current = sweep(110, [[1, 2, 3, 0.5]])
+    window = gather_window(current, [sweep(11, [[1, 1, 1, 0.5]]), sweep(9, [[2, 2, 2, 0.5]])])
+    assert window[:, 4].tolist() == pytest.approx([0, -9.9])
 
 
 def test_current_points_stay_as_they_are_whatever_they_are() -> None:

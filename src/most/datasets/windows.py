@@ -14,8 +14,7 @@ from most.errors import DataError, check_kept
 from most.geometry.poses import relative, transform
 from most.structures import OnDevice, Sample, Sweep
 
-OLDEST = 5.0  # s; sweeps before a longer pause say nothing of now, and networks learned from no such ages
-CLOCK = 1e-3  # s by which times of sweeps are off
+OLDEST = 10.0  # s; sweeps before a longer pause say nothing of now, and networks learned from no such ages
 
 
 @dataclass
@@ -85,7 +84,7 @@ def gather_window(current: Sweep, previous: list[Sweep]) -> Float32[Tensor, "poi
     """
     parts = [with_age(current.points, 0.0)]
     for sweep in previous:
-        if current.time - sweep.time > OLDEST + CLOCK:
+        if current.time - sweep.time > OLDEST:
             continue
         moved = transform(relative(current.pose, sweep.pose), sweep.points[:, :3])
         parts.append(with_age(torch.cat([moved, sweep.points[:, 3:]], dim=1), sweep.time - current.time))

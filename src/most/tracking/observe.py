@@ -10,9 +10,7 @@ from most.geometry.boxes import bounds
 from most.geometry.segments import measure
 from most.structures import Detections, Observations, OnDevice, Panoptic
 
-FARTHEST = (
-    1e3  # m; no car's lidar reaches there: a point beyond says as little of where its segment is as one at infinity
-)
+FARTHEST = 1e3  # m; no lidar of a car reaches there: a point beyond says as little of its segment's place as infinity
 UNDETECTED = 0.0  # score of a segment that no detection claims: any detection chooses its track before it
 
 
