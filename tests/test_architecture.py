@@ -28,7 +28,7 @@ COMPONENTS = {
     "simulation": {"datasets"},
 }
 LAYERS = [  # above the components: each knows all that are before it; docs/architecture.md says the same
-    ["claims", "device", "entry", "logs", "network", "submission"],
+    ["claims", "device", "entry", "logs", "network", "run_folder", "submission"],
     ["inference", "relabelling"],
     ["ladder", "predictions", "stages", "viz"],
     ["config"],

@@ -23,6 +23,7 @@ from most.datasets.reader import Reader
 from most.entry import end
 from most.errors import ConfigError, DataError, FailedError, MostError, StoppedError
 from most.reports.settings import NO_FIGURE, is_of
+from most.run_folder import TOLD
 from most.stages.settings import STAGES
 from most.training import METRICS, checkpoint_path
 
@@ -110,7 +111,7 @@ def _check(job: Job, readers: dict[str, Reader]) -> None:
 
 def _check_beginning(job: Job) -> None:
     """Refuse a folder in which a run of other settings began; those that one of them lacks are of a later version."""
-    written = job.folder / ".hydra"
+    written = job.folder / TOLD
     if not (job.finished or standing(job.folder)) or not (written / "config.yaml").is_file():
         return
     began = _written(written)
@@ -124,7 +125,7 @@ def _check_beginning(job: Job) -> None:
 
 
 def _written(folder: Path) -> dict[str, Any]:
-    """Read the settings, by dotted keys, and the choices that Hydra wrote down of a run."""
+    """Read the settings, by dotted keys, and the choices that were written down of a run."""
     try:
         settings, hydra = (OmegaConf.load(folder / name) for name in ("config.yaml", "hydra.yaml"))
         return flat(_plain(settings)) | chosen(hydra.hydra.runtime.choices)

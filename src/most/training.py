@@ -30,6 +30,8 @@ from most.datasets.datamodule import SweepDataModule
 from most.datasets.reader import Reader
 from most.errors import named
 from most.membership import PointSegMLP
+from most.metrics.report import write_report
+from most.run_folder import TOLD
 from most.stages.callbacks import Throughput
 from most.stages.checkpoints import AtomicCheckpointIO, LastCheckpoint
 from most.stages.detection import DetectionStage, DetectionTraining
@@ -39,6 +41,21 @@ from most.viz.callback import BevPictures
 from most.viz.class_tables import ClassTables
 
 METRICS = "metrics.json"  # of a run; it is written at its end
+
+
+def run_stage(
+    name: str, config: Config, data: SweepDataModule, folder: Path, logger: Logger | bool, resume: str | None
+) -> Stage:
+    """Train one stage from its beginning, or from a checkpoint, to its end."""
+    L.seed_everything(config.seed, workers=True)
+    stage = build_stage(name, config, data, Path(resume or stage1_file(config, Path(config.stage1 or folder))))
+    trainer = build_trainer(config, stage, folder, logger)
+    trainer.fit(stage, datamodule=data, ckpt_path=resume, weights_only=True)
+    if stage.report.get("epochs") != stage.epochs:
+        trainer.validate(stage, datamodule=data, verbose=False)
+    if trainer.is_global_zero and name == config.stage.run[-1]:
+        write_report(folder / METRICS, stage.report)
+    return stage
 
 
 def build_stage(name: str, config: Config, data: SweepDataModule, stage1: Path) -> Stage:
@@ -106,7 +123,7 @@ def checkpoint_path(folder: Path, stage: str, which: str) -> Path:
 
 def run_files(config: Config, folder: Path) -> dict[str, list[Path]]:
     """Return what a finished run leaves, by kind: its last model, its figures, and what it was told."""
-    told = [folder / ".hydra" / name for name in ("config.yaml", "overrides.yaml")]
+    told = [folder / TOLD / name for name in ("config.yaml", "overrides.yaml")]
     model = checkpoint_path(folder, config.stage.run[-1], "last")
     return {"model": [model], "metrics": [folder / METRICS], "config": told}
 

@@ -64,8 +64,18 @@ def refused(folder: Path, command: str, *arguments: str, **limits: int) -> str:
 def test_settings_are_refused_before_any_work(folder: Path, argument: str, words: list[str]) -> None:
     message = refused(folder, "train", *TRAIN, *argument.split())
     assert all(word in message for word in words), message
-    assert not (folder / "run" / "checkpoints").exists()
+    assert not (folder / "run").exists()
     assert not (folder / "tables").exists()
+
+
+def test_a_refused_training_leaves_what_a_finished_one_was_told(folder: Path, checkpoint: Path) -> None:
+    run = checkpoint.parents[1]
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    assert {"config.yaml", "hydra.yaml", "overrides.yaml"} <= {path.name for path in before}
+    told = [*TRAIN, f"hydra.run.dir={run}", "extent=shrink_wrap", "seed=7"]
+    refused(folder, "train", *told)
+    refused(folder, "train", *told, f"resume={checkpoint}")
+    assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
 
 
 def cut(path: Path, size: int) -> None:

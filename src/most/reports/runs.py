@@ -1,6 +1,6 @@
 """Finds training runs in a folder, at any depth, and reads what each was and what it reached.
 
-A run is a folder with ``.hydra/`` (``config.yaml``, ``overrides.yaml``, ``hydra.yaml``), as Hydra leaves them, and,
+A run is a folder with ``.hydra/`` (``config.yaml``, ``overrides.yaml``, ``hydra.yaml``), named as Hydra would, and,
 once it is finished, ``metrics.json``. What ``most.evaluate`` said of its predictions may lie in ``evaluated/NAME.json``
 beside it, where NAME is the membership that predicted (``full``, ``nearest``, ``clustering``, ...), unless the report
 itself says what predicted.
