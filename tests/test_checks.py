@@ -9,7 +9,7 @@ import torch
 
 from most.assembly import FORMAT, describe, describe_run, model_parts, stage1_parts, training_of
 from most.backbones import AsymmetricUNetSmallSettings
-from most.checks import check_resume, check_stage1, stages_to_run
+from most.checks import check_devices, check_resume, check_stage1, stages_to_run
 from most.config import Config, Heads, OffsetHeads, to_plain
 from most.datasets.augment import Augment
 from most.datasets.reader import Frame
@@ -171,7 +171,7 @@ OFFSETS = {"heads": OffsetHeads(OffsetHead(8))}
 @pytest.mark.parametrize(
     ("run", "change", "message"),
     [
-        (["detection", "membership"], OFFSETS, "needs no centres, .* heads are offset_regression, found point_seg_mlp"),
+        (["detection", "membership"], OFFSETS, "modal_centres.*; with it say stage=detection"),
         (["detection"], {**OFFSETS, "membership": Nearest()}, "found nearest; choose another, or heads=modal_centres"),
         (["detection"], {"membership": MeanShift()}, "found mean_shift; choose another, or heads=offset_regression"),
         (["detection", "membership"], {"membership": Clustering()}, "full, found clustering; with it say stage=detect"),
@@ -181,7 +181,7 @@ def test_a_membership_that_has_nothing_to_stand_on_is_refused(config, reader, tm
     config.stage.run = run
     for name, value in change.items():
         setattr(config, name, value)
-    with pytest.raises(ConfigError, match=rf"membership: expected .*{message}"):
+    with pytest.raises(ConfigError, match=rf"(membership|heads): expected .*{message}"):
         stages_to_run(config, reader, tmp_path)
 
 
@@ -220,8 +220,28 @@ def test_settings_that_came_after_a_checkpoint_are_at_their_defaults(config, rea
 def test_a_gpu_that_is_not_there_is_refused(config, reader, tmp_path):
     for devices in (1, -1):
         config.trainer = TrainerSettings(accelerator="gpu", devices=devices)
-        with pytest.raises(ConfigError, match=rf"no more GPUs than the 0 there are, found {devices}; trainer=cpu"):
+        with pytest.raises(ConfigError, match=r"trainer.accelerator: expected a GPU.* found none; say trainer=cpu"):
             stages_to_run(config, reader, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [({"devices": -1}, "trainer.devices: .*found -1"), ({"precision": "bf16-mixed"}, "trainer.precision: .*on a CPU")],
+)
+def test_what_only_gpus_do_is_refused_on_a_cpu(config, reader, tmp_path, settings, told):
+    config.trainer = TrainerSettings(accelerator="cpu", **settings)
+    with pytest.raises(ConfigError, match=told):
+        stages_to_run(config, reader, tmp_path)
+
+
+@pytest.mark.parametrize(("there", "devices"), [(1, 2), (2, 3)])
+def test_more_gpus_than_there_are_are_refused_whoever_chose_them(monkeypatch, there, devices):
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: there)
+    for accelerator in ("auto", "gpu"):
+        with pytest.raises(ConfigError, match=f"than the {there} there are, found {devices}"):
+            check_devices(TrainerSettings(accelerator=accelerator, devices=devices))
+        check_devices(TrainerSettings(accelerator=accelerator, devices=there))
+    check_devices(TrainerSettings(accelerator="cpu", devices=devices))
 
 
 def test_checkpoints_of_another_run_are_not_overwritten(config, reader, tmp_path):

@@ -3,8 +3,9 @@
 import json
 
 import pytest
+from omegaconf import OmegaConf
 
-from most.config import COMPONENTS, Config, from_plain, to_plain
+from most.config import COMPONENTS, Config, from_plain, to_plain, typed
 from most.errors import ConfigError
 
 
@@ -30,6 +31,11 @@ def test_what_is_not_the_default_survives_too():
         ("grid", {"component": "grid", "settings": {"spin": 1}}, r"grid\.spin"),
         ("grid", {"component": "grid", "settings": {"voxel_size": "small"}}, r"grid\.voxel_size"),
         ("grid", {"component": "grid", "settings": {"voxel_size": [0.0, 1.0, 1.0]}}, r"grid\.voxel_size: expected pos"),
+        (
+            "grid",
+            {"component": "grid", "settings": {"voxel_size": [999.0, 1, 1]}},
+            "expected 1 to 32768 voxels .*found .0",
+        ),
         ("encoder", {"component": "encoder", "settings": {"widths": []}}, r"encoder\.widths: expected"),
     ],
 )
@@ -42,3 +48,13 @@ def test_descriptions_that_make_no_component_are_refused(group, plain, message):
 def test_seeds_that_no_generator_takes_are_refused(seed):
     with pytest.raises(ConfigError, match=f"seed: expected a number .*found {seed}"):
         Config(seed=seed)
+
+
+def test_a_number_that_is_none_is_refused_wherever_it_stands():
+    with pytest.raises(ConfigError, match=r"a\.b\.1: expected a finite number, found inf"):
+        typed(OmegaConf.create({"a": {"b": [1.0, float("inf")]}}))
+
+
+def test_a_value_that_has_to_be_given_is_asked_for():
+    with pytest.raises(ConfigError, match=r"out: expected a value, found none; say out=\.\.\."):
+        typed(OmegaConf.create({"first": 1, "out": "???"}))

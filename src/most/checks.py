@@ -23,7 +23,7 @@ from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError
 from most.membership import PointSegMLPSettings
 from most.modal.extent import DropSmall
-from most.stages.trainer import TrainerSettings
+from most.stages.trainer import MIXED, TrainerSettings
 from most.training import batches_per_step, checkpoint_path, stage1_file
 from most.voxels import Grid
 
@@ -46,6 +46,11 @@ def stages_to_run(config: Config, reader: Reader, folder: Path) -> list[str]:
     for name in names:
         batches_per_step(config, name)
     check_dropped(config)
+    if "membership" in names and config.heads.centre.gives == "offsets":
+        raise ConfigError(
+            "heads: expected modal_centres, whose regions stage 2 learns on, found offset_regression; with it say "
+            "stage=detection"
+        )
     if "membership" in names and not isinstance(config.membership, PointSegMLPSettings):
         raise ConfigError(
             "membership: expected one that stage 2 can train, such as full, found "
@@ -71,13 +76,19 @@ def check_dropped(config: Config) -> None:
 
 
 def check_devices(trainer: TrainerSettings) -> None:
-    """Refuse a GPU where there is none, or more of them than there are."""
-    there = torch.cuda.device_count()
-    if trainer.accelerator == "gpu" and there < max(trainer.devices, 1):
+    """Refuse a GPU where there is none, more of them than there are, and on a CPU what only GPUs do."""
+    there = 0 if trainer.accelerator == "cpu" else torch.cuda.device_count()
+    if not there and trainer.accelerator == "gpu":
+        raise ConfigError("trainer.accelerator: expected a GPU, as trainer=gpu and ddp do, found none; say trainer=cpu")
+    if there and trainer.devices > there:
         raise ConfigError(
             f"trainer.devices: expected no more GPUs than the {there} there are, found {trainer.devices}; "
-            "trainer=cpu runs without one"
+            "say fewer, or trainer=cpu"
         )
+    if not there and trainer.devices < 0:
+        raise ConfigError(f"trainer.devices: expected a number of processes on a CPU, found {trainer.devices}")
+    if not there and trainer.precision in MIXED:
+        raise ConfigError(f"trainer.precision: expected 32-true or auto on a CPU, found {trainer.precision}")
 
 
 def check_folder(folder: Path) -> None:

@@ -5,6 +5,7 @@ unknown key or a wrong type is refused when the configuration is composed; range
 the composed configuration into the components themselves.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -143,11 +144,25 @@ def register() -> None:
 
 
 def typed(config: DictConfig | ListConfig) -> Any:
-    """Turn a composed configuration into its components; a value out of range is a ConfigError."""
+    """Turn a composed configuration into its components; a value out of range, or none, is a ConfigError."""
+    for key in sorted(OmegaConf.missing_keys(config)):
+        raise ConfigError(f"{key}: expected a value, found none; say {key}=...")
     try:
+        _check_finite(OmegaConf.to_container(config, resolve=True))
         return OmegaConf.to_object(config)
     except OmegaConfBaseException as error:
         raise ConfigError(f"{error.full_key or 'configuration'}: {error}") from error
+
+
+def _check_finite(settings: Any, key: str = "") -> None:
+    """Refuse numbers that are none or infinite: no setting means anything by them."""
+    parts = (
+        settings.items() if isinstance(settings, dict) else enumerate(settings) if isinstance(settings, list) else ()
+    )
+    for name, value in parts:
+        _check_finite(value, f"{key}.{name}" if key else str(name))
+    if isinstance(settings, float) and not math.isfinite(settings):
+        raise ConfigError(f"{key}: expected a finite number, found {settings}")
 
 
 def to_plain(group: str, component: Any) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from torch import Tensor
 from most.errors import ConfigError
 from most.structures import Sample, Voxels
 
+MOST_VOXELS = 2**15  # along an axis
 BEYOND = 50.0  # m above or below the grid; a stray point up there would outweigh all others in its voxel's means
 
 
@@ -46,6 +47,11 @@ class Grid:
             raise ConfigError(f"grid.lower, grid.upper: expected metres, found {self.lower} and {self.upper}")
         if any(high <= low for low, high in zip(self.lower, self.upper, strict=True)):
             raise ConfigError(f"grid.upper: expected more than grid.lower {self.lower}, found {self.upper}")
+        if not all(1 <= voxels <= MOST_VOXELS for voxels in self.shape):
+            raise ConfigError(
+                f"grid.voxel_size: expected 1 to {MOST_VOXELS} voxels along each axis, found {self.shape} of "
+                f"{self.voxel_size} m"
+            )
 
     @property
     def shape(self) -> tuple[int, int, int]:

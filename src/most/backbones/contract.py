@@ -1,6 +1,7 @@
-"""What every backbone takes and gives."""
+"""What every backbone takes and gives, and what its settings have to offer."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from jaxtyping import Float
 from torch import Tensor, nn
@@ -26,3 +27,16 @@ class Backbone(nn.Module):
     def forward(self, x: SparseTensor) -> BackboneFeatures:
         """Encode a batch of voxel grids."""
         raise NotImplementedError
+
+
+class BackboneSettings(Protocol):
+    """The dataclass that is a backbone's configuration schema; it is listed in ``most.config.COMPONENTS``."""
+
+    separate: bool  # another network of the same kind for detection ("w/o sharing", Table I); False by default
+
+    def build(self, in_channels: int, grid_shape: tuple[int, int, int], decoder: bool = True) -> Backbone:
+        """Make the network for features of ``in_channels`` on a grid of ``grid_shape`` (x, y, z) voxels.
+
+        Without a ``decoder`` it gives the bird's-eye view alone.
+        """
+        ...

@@ -119,7 +119,7 @@ class DetectionStage(Stage):
         optimizer, schedule = one_cycle(self.network.parameters(), self.training_settings, self.steps)
         return {
             "optimizer": optimizer,
-            "lr_scheduler": {"scheduler": schedule, "interval": "step", "name": LEARNING_RATE},
+            "lr_scheduler": {"scheduler": schedule, "interval": "step", "name": "learning_rate"},
         }
 
 

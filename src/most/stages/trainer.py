@@ -6,7 +6,8 @@ import torch
 
 from most.errors import ConfigError
 
-PRECISIONS = ("auto", "32-true", "bf16-mixed", "16-mixed")
+MIXED = ("bf16-mixed", "16-mixed")
+PRECISIONS = ("auto", "32-true", *MIXED)
 ACCELERATORS = ("auto", "cpu", "gpu")
 STRATEGIES = ("auto", "ddp")
 
