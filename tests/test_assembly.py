@@ -209,10 +209,9 @@ def test_other_files_are_refused(tmp_path, content):
         load_trained(path)
 
 
-def test_a_missing_file_and_a_folder_are_refused(tmp_path):
-    for path in (tmp_path / "none.ckpt", tmp_path):
-        with pytest.raises(DataError, match="expected a checkpoint, found no file; train a model first"):
-            load_trained(path)
+def test_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(DataError, match="expected a checkpoint, found no file; train a model first"):
+        load_trained(tmp_path / "none.ckpt")
 
 
 def without(key):
@@ -294,3 +293,14 @@ def test_a_dataset_that_the_model_does_not_know_is_refused():
     check_taxonomy(Taxonomy.load("nuscenes"), Taxonomy.load("nuscenes"))
     with pytest.raises(ConfigError, match="dataset: expected one of nuscenes, which the model knows, found one of sem"):
         check_taxonomy(Taxonomy.load("nuscenes"), Taxonomy.load("semantickitti"))
+
+
+def test_a_folder_is_no_checkpoint_and_the_file_to_name_is_said(tmp_path):
+    with pytest.raises(DataError, match=r"expected a checkpoint, found a folder; name a file, as checkpoints/STAGE"):
+        load_trained(tmp_path)
+    (tmp_path / "checkpoints").mkdir()
+    for name in ("membership-last", "detection-best"):
+        (tmp_path / "checkpoints" / f"{name}.ckpt").touch()
+    for folder in (tmp_path, tmp_path / "checkpoints"):
+        with pytest.raises(DataError, match=r"found a folder; name a file in it, such as .*/membership-last\.ckpt"):
+            load_trained(folder)

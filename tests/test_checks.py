@@ -244,6 +244,27 @@ def test_more_gpus_than_there_are_are_refused_whoever_chose_them(monkeypatch, th
     check_devices(TrainerSettings(accelerator="cpu", devices=devices))
 
 
+def test_the_folder_of_a_run_stands_for_its_newest_checkpoint(config, reader, tmp_path):
+    (tmp_path / "empty").mkdir()
+    config.resume = str(tmp_path / "empty")
+    with pytest.raises(ConfigError, match=r"resume: expected a run's folder with .*last\.ckpt, found none in .*empty"):
+        stages_to_run(config, reader, tmp_path)
+    config.resume = str(tmp_path)
+    for stage, left in (("detection", ["detection", "membership"]), ("membership", ["membership"])):
+        save(config, tmp_path, stage)
+        assert stages_to_run(config, reader, tmp_path) == left
+
+
+def test_a_folder_of_checkpoints_names_the_one_that_goes_on(config, reader, tmp_path):
+    best = save(config, tmp_path, "detection").rename(tmp_path / "checkpoints/detection-best.ckpt")
+    with pytest.raises(ConfigError, match=rf"found {best}; choose another one$"):
+        stages_to_run(config, reader, tmp_path)
+    for stage in ("detection", "membership"):
+        last = save(config, tmp_path, stage)
+        with pytest.raises(ConfigError, match=rf"found {best}; choose another one, or go on with resume={last}$"):
+            stages_to_run(config, reader, tmp_path)
+
+
 def test_checkpoints_of_another_run_are_not_overwritten(config, reader, tmp_path):
     kept = save(config, tmp_path, "detection")
     with pytest.raises(ConfigError, match=rf"expected a folder without checkpoints, found {kept}; .*resume={kept}"):

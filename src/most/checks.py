@@ -24,7 +24,7 @@ from most.errors import ConfigError
 from most.membership import PointSegMLPSettings
 from most.modal.extent import DropSmall
 from most.stages.trainer import MIXED, TrainerSettings
-from most.training import batches_per_step, checkpoint_path, stage1_file
+from most.training import batches_per_step, checkpoint_path, resumed_file, stage1_file, standing
 from most.voxels import Grid
 
 NETWORK = ("encoder", "backbone", "centre_head", "semantic_head")
@@ -94,15 +94,16 @@ def check_devices(trainer: TrainerSettings) -> None:
 def check_folder(folder: Path) -> None:
     """Refuse a folder with another run's checkpoints, which would be overwritten."""
     if kept := sorted((folder / "checkpoints").glob("*.ckpt")):
+        last = standing(folder)
         raise ConfigError(
-            f"hydra.run.dir: expected a folder without checkpoints, found {kept[0]}; "
-            f"choose another one, or go on with resume={kept[0]}"
+            f"hydra.run.dir: expected a folder without checkpoints, found {kept[0]}; choose another one"
+            + (f", or go on with resume={last}" if last else "")
         )
 
 
 def check_resume(config: Config, reader: Reader, folder: Path) -> str:
     """Return the stage that a run goes on with; refuse another model, other settings, or another folder."""
-    path = Path(str(config.resume))
+    path = resumed_file(Path(str(config.resume)))
     saved = read_checkpoint(path)
     if "optimizer_states" not in saved:
         raise ConfigError(

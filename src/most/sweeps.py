@@ -24,8 +24,7 @@ from most.entry import end
 from most.errors import ConfigError, DataError, FailedError, MostError, StoppedError
 from most.reports.settings import NO_FIGURE, is_of
 from most.run_folder import TOLD
-from most.stages.settings import STAGES
-from most.training import METRICS, checkpoint_path
+from most.training import METRICS, standing
 
 LONGEST = 120  # characters of a folder's name
 ELSEWHERE = ("experiment", "dataset.root")  # they stand in the sweep's folder, or are too long for a name
@@ -134,12 +133,6 @@ def _written(folder: Path) -> dict[str, Any]:
             f"{folder}: expected the settings that the job began with, found none readable ({error}); "
             "remove that folder where you know that they were the same, else the job's"
         ) from error
-
-
-def standing(folder: Path) -> str | None:
-    """Return the checkpoint with which a run in ``folder`` goes on, where it was stopped."""
-    kept = [checkpoint_path(folder, stage, "last") for stage in reversed(STAGES)]
-    return next((str(path) for path in kept if path.is_file()), None)
 
 
 def in_sweep(config: Config, sweep: str, folder: Path) -> Config:

@@ -19,7 +19,7 @@ from most.entry import run, start
 from most.run_folder import gone_if_refused, write_down
 from most.stages.artifacts import log_artifacts
 from most.sweeps import as_job, by_key, chosen, in_sweep
-from most.training import run_files, run_stage
+from most.training import resumed_file, run_files, run_stage
 
 register()
 
@@ -36,10 +36,11 @@ def train(config: Config, folder: Path, told: dict[str, Any], begin: Callable[[]
     names = stages_to_run(config, data.reader, folder)
     begin()
     settings: Any = OmegaConf.to_container(OmegaConf.structured(config))
+    resume = str(resumed_file(Path(config.resume))) if config.resume else None
     try:
         logger = config.logger.build(folder, config.name, settings | told)
         for name in names:
-            stage = run_stage(name, config, data, folder, logger, config.resume if name == names[0] else None)
+            stage = run_stage(name, config, data, folder, logger, resume if name == names[0] else None)
         log_artifacts(logger, run_files(config, folder))
     finally:
         wandb.finish()  # the next job of a sweep runs in this process, and is another run

@@ -28,7 +28,7 @@ from most.config import Config
 from most.datasets.class_counts import class_counts
 from most.datasets.datamodule import SweepDataModule
 from most.datasets.reader import Reader
-from most.errors import named
+from most.errors import ConfigError, named
 from most.membership import PointSegMLP
 from most.metrics.report import write_report
 from most.run_folder import TOLD
@@ -36,6 +36,7 @@ from most.stages.callbacks import Throughput
 from most.stages.checkpoints import AtomicCheckpointIO, LastCheckpoint
 from most.stages.detection import DetectionStage, DetectionTraining
 from most.stages.membership import MembershipStage
+from most.stages.settings import STAGES
 from most.stages.stage import Stage
 from most.viz.callback import BevPictures
 from most.viz.class_tables import ClassTables
@@ -119,6 +120,24 @@ def _notes(config: Config, stage: str, parts: dict[str, Any], reader: Reader) ->
 def checkpoint_path(folder: Path, stage: str, which: str) -> Path:
     """Where a run keeps a stage's ``last`` or ``best`` weights."""
     return folder / "checkpoints" / f"{stage}-{which}.ckpt"
+
+
+def standing(folder: Path) -> str | None:
+    """Return the checkpoint with which a run in ``folder`` goes on, where it was stopped."""
+    kept = [checkpoint_path(folder, stage, "last") for stage in reversed(STAGES)]
+    return next((str(path) for path in kept if path.is_file()), None)
+
+
+def resumed_file(place: Path) -> Path:
+    """Return the checkpoint that a run goes on from: ``place`` itself, or the newest of the run in this folder."""
+    if not place.is_dir():
+        return place
+    if (kept := standing(place)) is None:
+        raise ConfigError(
+            f"resume: expected a run's folder with checkpoints/STAGE-last.ckpt, found none in {place}; choose another "
+            "one, name a checkpoint, or leave it out to train from the beginning"
+        )
+    return Path(kept)
 
 
 def run_files(config: Config, folder: Path) -> dict[str, list[Path]]:
