@@ -9,7 +9,7 @@ from hydra.core.hydra_config import HydraConfig
 
 from most.config import conf_dir, register
 from most.errors import ConfigError
-from most.run_folder import gone_if_refused, write_down
+from most.run_folder import check_shared, gone_if_refused, write_down
 from most.sweeps import Job
 
 
@@ -53,3 +53,23 @@ def test_a_run_that_ends_well_keeps_its_folder(tmp_path):
     with gone_if_refused(tmp_path / "run"):
         (tmp_path / "run").mkdir()
     assert (tmp_path / "run").is_dir()
+
+
+@pytest.mark.parametrize("name", ["WORLD_SIZE", "SLURM_NTASKS"])
+def test_processes_that_others_start_are_told_the_folder_that_they_share(name, monkeypatch):
+    for each in ("WORLD_SIZE", "SLURM_NTASKS", "SLURM_JOB_NAME"):
+        monkeypatch.delenv(each, raising=False)
+    check_shared([])
+    monkeypatch.setenv(name, "1")
+    check_shared([])
+    monkeypatch.setenv(name, "2")
+    check_shared(["hydra.job.name=a", "hydra.run.dir=runs/a"])
+    with pytest.raises(ConfigError, match=rf"hydra\.run\.dir: expected the folder .* {name}=2; add hydra\.run\.dir"):
+        check_shared(["hydra.job.name=a"])
+
+
+def test_an_interactive_job_of_slurm_is_one_process(monkeypatch):
+    monkeypatch.delenv("WORLD_SIZE", raising=False)
+    monkeypatch.setenv("SLURM_NTASKS", "4")
+    monkeypatch.setenv("SLURM_JOB_NAME", "interactive")
+    check_shared([])

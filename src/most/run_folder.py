@@ -1,6 +1,7 @@
 """What stands in a run's folder from its beginning: what it was told, once that is accepted; else nothing."""
 
-from collections.abc import Iterator
+import os
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -8,9 +9,30 @@ from hydra.core.hydra_config import HydraConfig
 from lightning.pytorch.utilities import rank_zero_only
 from omegaconf import DictConfig, OmegaConf
 
+from most.errors import ConfigError
 from most.files import atomic_write
 
 TOLD = ".hydra"  # where Hydra itself would put it, but before anyone has looked whether the run may be here
+
+
+INTERACTIVE = ("bash", "interactive")  # names of SLURM's jobs in which Lightning expects one process
+
+
+def check_shared(overrides: Sequence[str]) -> None:
+    """Refuse processes of torchrun or SLURM that no one told their folder: each would make one of its own.
+
+    Those that Lightning starts are told theirs.
+    """
+    if any(override.lstrip("+").startswith("hydra.run.dir=") for override in overrides):
+        return
+    for name in ("WORLD_SIZE", "SLURM_NTASKS"):
+        alone = name == "SLURM_NTASKS" and os.environ.get("SLURM_JOB_NAME") in INTERACTIVE
+        found = os.environ.get(name, "")
+        if not alone and found.isdigit() and int(found) > 1:
+            raise ConfigError(
+                f"hydra.run.dir: expected the folder that all processes share, found none though {name}={found}; "
+                "add hydra.run.dir=FOLDER"
+            )
 
 
 @rank_zero_only

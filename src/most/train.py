@@ -16,7 +16,7 @@ from most.checks import stages_to_run
 from most.config import Config, conf_dir, register, typed
 from most.datasets.datamodule import SweepDataModule
 from most.entry import run, start
-from most.run_folder import gone_if_refused, write_down
+from most.run_folder import check_shared, gone_if_refused, write_down
 from most.stages.artifacts import log_artifacts
 from most.sweeps import as_job, by_key, chosen, in_sweep
 from most.training import resumed_file, run_files, run_stage
@@ -59,6 +59,7 @@ def main(config: DictConfig) -> Any:
 
     def alone() -> None:
         with gone_if_refused(folder):
+            check_shared(job.overrides.hydra)
             train(typed(config), folder, told, begin)
 
     return run(alone)
