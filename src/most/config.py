@@ -186,4 +186,5 @@ def from_settings(schema: type, name: str, settings: Mapping[str, Any]) -> Any:
         merged = OmegaConf.merge(OmegaConf.structured(schema), settings)
     except OmegaConfBaseException as error:
         raise ConfigError(f"{name}.{error.full_key}: {error}") from error
+    _check_finite(OmegaConf.to_container(merged), name)
     return typed(merged)

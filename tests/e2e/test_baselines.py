@@ -52,7 +52,10 @@ def test_offset_regression_is_trained_predicted_tracked_and_scored(streets):
 
     refused = most(streets, "train", *TRAIN, *SHORT, "heads=offset_regression", "hydra.run.dir=both")
     assert refused.returncode == 2
-    assert "the model's heads are offset_regression, found point_seg_mlp" in refused.stderr
+    assert (
+        "expected modal_centres, whose regions stage 2 learns on, found offset_regression; with it say stage=detection"
+        in refused.stderr
+    )
 
 
 def test_a_separate_backbone_serves_both_stages_and_clustering_stands_on_it(streets):
