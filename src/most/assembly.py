@@ -10,6 +10,7 @@ from typing import Any, cast
 import torch
 from torch import nn
 
+from most.backbones.contract import BackboneSettings
 from most.config import Config, from_plain, to_plain
 from most.datasets.reader import Frame
 from most.datasets.taxonomy import Taxonomy
@@ -35,7 +36,8 @@ def build_network(parts: dict[str, Any], taxonomy: Taxonomy) -> Network:
     """Make the stage-1 network of the components named in ``GROUPS``."""
     grid: Grid = parts["grid"]
     encoder = parts["encoder"].build(grid)
-    backbone = parts["backbone"].build(encoder.voxel_channels, grid.shape)
+    settings: BackboneSettings = parts["backbone"]
+    backbone = settings.build(encoder.voxel_channels, grid.shape)
     centre_head, semantic_head = parts["centre_head"], cast(SemanticHead, parts["semantic_head"])
     on_voxels = centre_head.gives == "offsets"
     return Network(
@@ -46,7 +48,7 @@ def build_network(parts: dict[str, Any], taxonomy: Taxonomy) -> Network:
         semantic_head.build(
             taxonomy.num_classes - 1, backbone.voxel_channels, encoder.point_channels, backbone.bev_channels
         ),
-        build_trunk(parts, decoder=on_voxels) if parts["backbone"].separate else None,
+        build_trunk(parts, decoder=on_voxels) if settings.separate else None,
     )
 
 

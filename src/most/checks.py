@@ -46,16 +46,8 @@ def stages_to_run(config: Config, reader: Reader, folder: Path) -> list[str]:
     for name in names:
         batches_per_step(config, name)
     check_dropped(config)
-    if "membership" in names and config.heads.centre.gives == "offsets":
-        raise ConfigError(
-            "heads: expected modal_centres, whose regions stage 2 learns on, found offset_regression; with it say "
-            "stage=detection"
-        )
-    if "membership" in names and not isinstance(config.membership, PointSegMLPSettings):
-        raise ConfigError(
-            "membership: expected one that stage 2 can train, such as full, found "
-            f"{to_plain('membership', config.membership)['component']}; with it say stage=detection"
-        )
+    if "membership" in names:
+        check_learnable(config)
     check_membership(model_parts(config) if "membership" in names else stage1_parts(config))
     if config.resume:
         return names[names.index(check_resume(config, reader, folder)) :]
@@ -63,6 +55,20 @@ def stages_to_run(config: Config, reader: Reader, folder: Path) -> list[str]:
     check_stage1(config, reader.taxonomy)
     check_weights(config, reader.taxonomy)
     return names
+
+
+def check_learnable(config: Config) -> None:
+    """Refuse a stage 2 that has no detected centres to learn on, or nothing to learn."""
+    if config.heads.centre.gives == "offsets":
+        raise ConfigError(
+            "heads: expected modal_centres, whose regions stage 2 learns on, found offset_regression; with it say "
+            "stage=detection"
+        )
+    if not isinstance(config.membership, PointSegMLPSettings):
+        raise ConfigError(
+            "membership: expected one that stage 2 can train, such as full, found "
+            f"{to_plain('membership', config.membership)['component']}; with it say stage=detection"
+        )
 
 
 def check_dropped(config: Config) -> None:
@@ -78,16 +84,18 @@ def check_dropped(config: Config) -> None:
 def check_devices(trainer: TrainerSettings) -> None:
     """Refuse a GPU where there is none, more of them than there are, and on a CPU what only GPUs do."""
     there = 0 if trainer.accelerator == "cpu" else torch.cuda.device_count()
-    if not there and trainer.accelerator == "gpu":
+    if there:
+        if trainer.devices > there:
+            raise ConfigError(
+                f"trainer.devices: expected no more GPUs than the {there} there are, found {trainer.devices}; "
+                "say fewer, or trainer=cpu"
+            )
+        return
+    if trainer.accelerator == "gpu":
         raise ConfigError("trainer.accelerator: expected a GPU, as trainer=gpu and ddp do, found none; say trainer=cpu")
-    if there and trainer.devices > there:
-        raise ConfigError(
-            f"trainer.devices: expected no more GPUs than the {there} there are, found {trainer.devices}; "
-            "say fewer, or trainer=cpu"
-        )
-    if not there and trainer.devices < 0:
+    if trainer.devices < 0:
         raise ConfigError(f"trainer.devices: expected a number of processes on a CPU, found {trainer.devices}")
-    if not there and trainer.precision in MIXED:
+    if trainer.precision in MIXED:
         raise ConfigError(f"trainer.precision: expected 32-true or auto on a CPU, found {trainer.precision}")
 
 

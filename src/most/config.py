@@ -143,26 +143,29 @@ def register() -> None:
             store.store(group=group, name=f"{name}_schema", node=schema)
 
 
-def typed(config: DictConfig | ListConfig) -> Any:
-    """Turn a composed configuration into its components; a value out of range, or none, is a ConfigError."""
-    for key in sorted(OmegaConf.missing_keys(config)):
-        raise ConfigError(f"{key}: expected a value, found none; say {key}=...")
+def typed(config: DictConfig | ListConfig, name: str = "") -> Any:
+    """Turn a composed configuration into its components; a value out of range, or none, is a ConfigError.
+
+    ``name`` is the group that it is the settings of, for messages.
+    """
+    if missing := sorted(OmegaConf.missing_keys(config)):
+        raise ConfigError(f"{missing[0]}: expected a value, found none; say {missing[0]}=...")
     try:
-        _check_finite(OmegaConf.to_container(config, resolve=True))
+        _check_finite(OmegaConf.to_container(config, resolve=True), name)
         return OmegaConf.to_object(config)
     except OmegaConfBaseException as error:
         raise ConfigError(f"{error.full_key or 'configuration'}: {error}") from error
 
 
-def _check_finite(settings: Any, key: str = "") -> None:
-    """Refuse numbers that are none or infinite: no setting means anything by them."""
-    parts = (
-        settings.items() if isinstance(settings, dict) else enumerate(settings) if isinstance(settings, list) else ()
-    )
-    for name, value in parts:
-        _check_finite(value, f"{key}.{name}" if key else str(name))
-    if isinstance(settings, float) and not math.isfinite(settings):
-        raise ConfigError(f"{key}: expected a finite number, found {settings}")
+def _check_finite(value: Any, key: str) -> None:
+    """Refuse numbers that are none or infinite, however deep: no setting means anything by them."""
+    if isinstance(value, list):
+        value = dict(enumerate(value))
+    if isinstance(value, dict):
+        for name, part in value.items():
+            _check_finite(part, f"{key}.{name}".lstrip("."))
+    elif isinstance(value, float) and not math.isfinite(value):
+        raise ConfigError(f"{key}: expected a finite number, found {value}")
 
 
 def to_plain(group: str, component: Any) -> dict[str, Any]:
@@ -186,5 +189,4 @@ def from_settings(schema: type, name: str, settings: Mapping[str, Any]) -> Any:
         merged = OmegaConf.merge(OmegaConf.structured(schema), settings)
     except OmegaConfBaseException as error:
         raise ConfigError(f"{name}.{error.full_key}: {error}") from error
-    _check_finite(OmegaConf.to_container(merged), name)
-    return typed(merged)
+    return typed(merged, name)

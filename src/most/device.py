@@ -11,4 +11,5 @@ def chosen_device(name: str) -> torch.device:
     gpus = ["cuda", *(f"cuda:{number}" for number in range(torch.cuda.device_count()))] if there else []
     if name not in ("auto", "cpu", *gpus):
         raise ConfigError(f"device: expected auto, cpu, or cuda where there is a GPU, found {name}")
-    return torch.device("cuda" if name == "auto" and there else "cpu" if name == "auto" else name)
+    automatic = "cuda" if there else "cpu"
+    return torch.device(automatic if name == "auto" else name)

@@ -7,6 +7,7 @@ from most.errors import DataError
 from most.metrics.links import Links
 from most.metrics.paired import paired_difference
 from most.metrics.velocities import VelocityErrors, is_moving, velocity_errors
+from most.metrics.velocity_gain import mean_gain
 from most.metrics.velocity_table import format_velocity_gain
 from most.structures import Detections, Instances
 
@@ -31,6 +32,11 @@ def test_the_interval_is_the_same_in_every_run_and_close_to_students() -> None:
     found = paired_difference(values.tolist(), [0.0] * 100)
     assert found == paired_difference(values.tolist(), [0.0] * 100)
     assert (found.low, found.high) == pytest.approx((1 - 0.392, 1 + 0.392), abs=0.03)
+
+
+def test_a_sequence_without_a_figure_counts_in_no_mean() -> None:
+    found = mean_gain([0.5, float("nan"), 0.7], [0.4, 0.9, 0.6])
+    assert (found["velocity"], found["nearest"], found["difference"]) == pytest.approx((0.6, 0.5, 0.1))
 
 
 @pytest.mark.parametrize("figures", [[], [0.5], [0.5, float("nan")]])

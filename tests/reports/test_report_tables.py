@@ -188,12 +188,14 @@ def test_seeds_are_parted_by_what_any_row_says_of_them(tmp_path: Path) -> None:
     example_run(tmp_path, example_sums(0.7, 1))
     (one,) = find_runs(tmp_path).scored
 
-    def row(*stages1: str) -> dict[int, Scored]:
-        return {seed: replace(one, stage1=stage1) for seed, stage1 in enumerate(stages1, start=1)}
+    def row(*stages1: str, extent: str = "track_max") -> dict[int, Scored]:
+        like = replace(one, strategy=replace(one.strategy, extent=extent))
+        return {seed: replace(like, stage1=stage1) for seed, stage1 in enumerate(stages1, start=1)}
 
     assert units(row("a", "b", "c")) == [[1], [2], [3]]
-    assert units(row("a", "b", "b", "d"), row("a", "a", "c")) == [[1, 2, 3]]
-    assert units(row("a", "b", "b", "d"), row("a", "b", "c", "d")) == [[1], [2, 3], [4]]
+    assert units(row("a", "b", "b", "d"), row("a", "a", "c", extent="amodal")) == [[1, 2, 3]]
+    assert units(row("a", "b", "b", "d"), row("a", "b", "c", "d", extent="amodal")) == [[1], [2, 3], [4]]
+    assert units(row("a", "b", "b", "d"), row("a", "b", "c", "d")) == [[1], [2], [4]]  # memberships on other stages 1
     assert units(row("a"), {}) == []
 
 

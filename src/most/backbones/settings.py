@@ -33,10 +33,7 @@ class UNetSettings:
             raise ConfigError(f"backbone.bev_channels: expected at least 1, found {self.bev_channels}")
 
     def build(self, in_channels: int, grid_shape: tuple[int, int, int], decoder: bool = True) -> Backbone:
-        """Make the network for features of ``in_channels`` on a grid of ``grid_shape`` (x, y, z) voxels.
-
-        Without a ``decoder`` it gives the bird's-eye view alone.
-        """
+        """See :class:`most.backbones.contract.BackboneSettings`."""
         height = -(-grid_shape[2] // 2 ** (len(self.widths) - 1))
         return UNet(
             in_channels,

@@ -109,7 +109,12 @@ def _columns(path: Path, fields: Mapping[str, np.ndarray], count: int) -> Num[np
     if missing := [axis for axis in "xyz" if axis not in named]:
         raise DataError(f"{path}: expected fields x, y and z, found no {', '.join(missing)} in {', '.join(named)}")
     chosen = [*"xyz", *[name for name in INTENSITY if name in named][:1]]
-    if short := [name for name in chosen if len(named[name]) != count or named[name].dtype.kind not in "fiu"]:
+    if others := [name for name in chosen if named[name].dtype.kind not in "fiu"]:
+        raise DataError(
+            f"{path}: expected numbers in {', '.join(chosen)}, found others in {others[0]}; the file is cut off or "
+            "damaged: copy it again"
+        )
+    if short := [name for name in chosen if len(named[name]) != count]:
         raise DataError(
             f"{path}: expected the {count} points that its header tells of, found {len(named[short[0]])}; "
             "the file is cut off: copy it again"

@@ -57,7 +57,7 @@ def velocity_gain(
     return {
         "scans": len(frames),
         "sequences": {name: {way: lstq[way][row] for way in lstq} for row, name in enumerate(names)},
-        "lstq": _lstq(lstq["velocity"], lstq["nearest"]),
+        "lstq": mean_gain(lstq["velocity"], lstq["nearest"]),
         "links": {kind: {name: _links(way, kind) for name, way in ways.items()} for kind in ("all", "moving")},
         "velocity_error": _by_class(VelocityErrors.cat(errors), reader.taxonomy),
     }
@@ -125,8 +125,8 @@ def _links(sequences: Sequence[_Way], kind: str) -> dict[str, int]:
     return asdict(sum((each.links[kind] for each in sequences), Links()))
 
 
-def _lstq(velocity: list[float], nearest: list[float]) -> dict[str, float | None]:
-    """Means and the difference over the sequences that have a figure: one without things has none."""
+def mean_gain(velocity: list[float], nearest: list[float]) -> dict[str, float | None]:
+    """Return means, difference and interval over the sequences that have an LSTQ: one without things has none (NaN)."""
     ways = np.array([velocity, nearest])
     ways = ways[:, np.isfinite(ways).all(0)]
     gain = paired_difference(*ways.tolist())

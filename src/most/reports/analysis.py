@@ -13,7 +13,7 @@ from most.reports.figures import Figures, Presence, figures
 from most.reports.groups import Group
 from most.reports.runs import Scored
 from most.reports.table import Cells
-from most.reports.units import BySeed, paired, units
+from most.reports.units import BySeed, units
 
 
 class Analysis:
@@ -33,7 +33,6 @@ class Analysis:
 
     def differences(self, runs: BySeed, others: BySeed, columns: Mapping[str, str]) -> Cells:
         """How much higher the figures of ``runs`` are, over the seeds that are paired; None without such."""
-        runs, others = paired(runs, others)
         common = units(runs, others)
         found: Cells = {}
         for title, key in columns.items():

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from most.metrics.sightings import VISIBLE
+from most.reports.figures import FEWEST
 from most.reports.sums import Measured
 
 
@@ -25,22 +26,25 @@ class Bins:
 
 
 OFFICIAL = "Segments count as officially."
+FEW = f"Bins of fewer than {FEWEST} objects have no figure."
 SEEN = (
     "How much of an object is seen: how long its points reach over ground in the scan, of the longest that they ever "
     f"do in the sequence. {OFFICIAL} False segments count for the object that most of their points are of. Left out "
-    "are those of no object, objects that are there in one scan alone, and shares that fewer than 10 objects have."
+    f"are those of no object, and objects that are there in one scan alone. {FEW}"
 )
 
 
 def by_distance(measured: Measured) -> Bins:
     """As far as things are from the sensor."""
     labels = _labels(measured.distance_edges, step=0)
-    return Bins("distance", "PQ of things against distance", "distance of the modal centre, m", OFFICIAL, labels)
+    return Bins(
+        "distance", "PQ of things against distance", "distance of the modal centre, m", f"{OFFICIAL} {FEW}", labels
+    )
 
 
 def by_points(measured: Measured) -> Bins:
     """As many points as things have."""
-    meaning = "Those too small for the official figure count here, too."
+    meaning = f"Those too small for the official figure count here, too. {FEW}"
     labels = _labels(measured.points_edges, step=1)
     return Bins("points", "PQ of things against points per instance", "points of the instance", meaning, labels)
 

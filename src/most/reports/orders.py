@@ -10,7 +10,7 @@ from most.reports.paper import paper_figure
 from most.reports.strategy import EXTENTS
 from most.reports.table import Block, Cells, Row, Table
 from most.reports.tables import measured_here
-from most.reports.units import paired, units
+from most.reports.units import units
 
 SW, NEAREST = "shrink_wrap", "nearest"
 WORDS = ("shown", "reversed", "open")
@@ -67,7 +67,7 @@ def order_table(ablations: Mapping[str, Ablation], analysis: Analysis) -> Table 
         title = " above ".join(NAMES.get(name, name) for name in (claim.better, claim.worse))
         better, worse = (ablation.runs(analysis.group, ablation.rows[name]) for name in (claim.better, claim.worse))
         differences = analysis.differences(better, worse, COLUMNS)
-        rows.append(Row(title, differences | _papers(claim), units(*paired(better, worse))))
+        rows.append(Row(title, differences | _papers(claim), units(better, worse)))
         said[title] = verdict(differences["PQ"], len(rows[-1].parts))
     if not rows:
         return None

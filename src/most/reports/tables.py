@@ -13,7 +13,7 @@ from most.reports.notes import predictions, trackers, unseen, unsummed
 from most.reports.paper import paper_block
 from most.reports.sums import SEGMENTS
 from most.reports.table import Block, Row, Table
-from most.reports.units import BySeed, paired, units
+from most.reports.units import BySeed, units
 
 
 def measured_here(analysis: Analysis) -> str:
@@ -43,7 +43,7 @@ def difference_table(ablation: Ablation, analysis: Analysis, baseline: str | Non
         runs = ablation.runs(analysis.group, each)
         if each != base:
             cells = analysis.differences(runs, others, ablation.columns)
-            made.append(Row(ablation.title_of(each), cells, units(*paired(runs, others))))
+            made.append(Row(ablation.title_of(each), cells, units(runs, others)))
     if not made:
         return None
     title = f"{ablation.title}, differences to {ablation.title_of(base)}"
