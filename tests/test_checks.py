@@ -16,6 +16,7 @@ from most.datasets.reader import Frame
 from most.datasets.semantickitti import SemanticKITTI, SemanticKITTISettings, Splits
 from most.errors import ConfigError, DataError
 from most.heads import OffsetHead, OrientedCentreHead
+from most.logs import LoggerSettings
 from most.membership import Clustering, MeanShift, Nearest, PointSegMLPSettings
 from most.modal.amodal import Amodal
 from most.modal.extent import DropSmall, TrackMax
@@ -40,6 +41,7 @@ def config() -> Config:
     parts = tiny_parts()
     return Config(
         dataset=SemanticKITTISettings(sweeps=2), augment=Augment(), extent=TrackMax(), trainer=TrainerSettings(),
+        logger=LoggerSettings(),
         stage=StageSettings(detection=DetectionTraining(epochs=4), membership=MembershipTraining(epochs=2)),
         heads=Heads(parts["centre_head"], parts["semantic_head"]), membership=PointSegMLPSettings([4]),
         **{name: parts[name] for name in ("grid", "encoder", "backbone", "inference")},
@@ -267,7 +269,21 @@ def test_a_folder_of_checkpoints_names_the_one_that_goes_on(config, reader, tmp_
 
 def test_checkpoints_of_another_run_are_not_overwritten(config, reader, tmp_path):
     kept = save(config, tmp_path, "detection")
-    with pytest.raises(ConfigError, match=rf"expected a folder without checkpoints, found {kept}; .*resume={kept}"):
+    with pytest.raises(ConfigError, match=rf"expected a folder of no other run, found {kept}; .*resume={kept}"):
+        stages_to_run(config, reader, tmp_path)
+
+
+def test_figures_of_another_run_are_not_overwritten_where_its_checkpoints_are_gone(config, reader, tmp_path):
+    (tmp_path / "metrics.json").write_text("{}")
+    with pytest.raises(ConfigError, match=r"folder of no other run, found .*metrics.json; choose another one$"):
+        stages_to_run(config, reader, tmp_path)
+
+
+def test_logging_online_needs_an_account_before_any_work(config, reader, tmp_path, monkeypatch):
+    monkeypatch.setattr("wandb.login", lambda verify: False)
+    monkeypatch.setenv("WANDB_MODE", "offline")
+    config.logger = LoggerSettings(mode="online")
+    with pytest.raises(ConfigError, match=r"logger\.mode: expected a key"):
         stages_to_run(config, reader, tmp_path)
 
 

@@ -3,6 +3,7 @@
 import os
 
 import pytest
+import wandb
 from lightning.pytorch.loggers import CSVLogger, WandbLogger
 
 from most.errors import ConfigError
@@ -10,11 +11,14 @@ from most.logs import LoggerSettings
 
 
 @pytest.fixture
-def no_account(monkeypatch):
-    """No key; and what ``build`` sets in the environment is put back."""
+def no_account(monkeypatch, tmp_path):
+    """No key anywhere, none that W&B remembers; and what is set in the environment is put back."""
+    wandb.teardown()
     monkeypatch.delenv("WANDB_API_KEY", raising=False)
+    monkeypatch.setenv("NETRC", str(tmp_path / "none"))
     monkeypatch.setenv("WANDB_MODE", "disabled")
-    return monkeypatch
+    yield monkeypatch
+    wandb.teardown()
 
 
 def test_none_logs_nowhere(tmp_path):
@@ -39,12 +43,30 @@ def test_wandb_is_offline_unless_asked_and_knows_the_configuration(tmp_path, no_
     assert init["dir"] == str(tmp_path)
 
 
-@pytest.mark.parametrize(("key", "mode"), [(None, "offline"), ("0" * 40, "online")])
-def test_online_needs_a_key(tmp_path, no_account, key, mode):
-    if key:
-        no_account.setenv("WANDB_API_KEY", key)
-    LoggerSettings(mode="online").build(tmp_path, "a", {})
-    assert os.environ["WANDB_MODE"] == mode
+def test_online_needs_a_key(no_account):
+    with pytest.raises(ConfigError, match=r"logger\.mode: expected a key for online, found none; run wandb login"):
+        LoggerSettings(mode="online").check_account()
+
+
+@pytest.mark.parametrize("settings", [{}, {"kind": "csv", "mode": "online"}, {"kind": "none", "mode": "online"}])
+def test_what_is_not_sent_needs_none(no_account, settings):
+    LoggerSettings(**settings).check_account()
+
+
+def test_a_key_of_the_environment_is_taken(tmp_path, no_account):
+    no_account.setenv("WANDB_API_KEY", "0" * 40)
+    settings = LoggerSettings(mode="online")
+    settings.check_account()
+    settings.build(tmp_path, "a", {})
+    assert os.environ["WANDB_MODE"] == "online"
+
+
+def test_the_key_of_wandb_login_is_taken(tmp_path, no_account):
+    netrc = tmp_path / "netrc"
+    netrc.write_text(f"machine api.wandb.ai login user password {'0' * 40}\n")
+    netrc.chmod(0o600)
+    no_account.setenv("NETRC", str(netrc))
+    LoggerSettings(mode="online").check_account()
 
 
 @pytest.mark.parametrize("wrong", [{"kind": "tensorboard"}, {"mode": "cloud"}, {"pictures": -1}])

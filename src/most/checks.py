@@ -24,7 +24,7 @@ from most.errors import ConfigError
 from most.membership import PointSegMLPSettings
 from most.modal.extent import DropSmall
 from most.stages.trainer import MIXED, TrainerSettings
-from most.training import batches_per_step, checkpoint_path, resumed_file, stage1_file, standing
+from most.training import METRICS, batches_per_step, checkpoint_path, resumed_file, stage1_file, standing
 from most.voxels import Grid
 
 NETWORK = ("encoder", "backbone", "centre_head", "semantic_head")
@@ -35,6 +35,7 @@ def stages_to_run(config: Config, reader: Reader, folder: Path) -> list[str]:
     """Return the stages still to be trained in the run's ``folder``; what does not fit is a ConfigError."""
     names: list[str] = config.stage.run
     check_devices(config.trainer)
+    config.logger.check_account()
     for split in ("train", "val"):
         scans = len(reader.frames(split))  # raises where the dataset is not there
         if scans < config.trainer.processes():
@@ -100,11 +101,11 @@ def check_devices(trainer: TrainerSettings) -> None:
 
 
 def check_folder(folder: Path) -> None:
-    """Refuse a folder with another run's checkpoints, which would be overwritten."""
-    if kept := sorted((folder / "checkpoints").glob("*.ckpt")):
+    """Refuse a folder with another run's checkpoints or figures, which would be overwritten."""
+    if kept := [*sorted((folder / "checkpoints").glob("*.ckpt")), *folder.glob(METRICS)]:
         last = standing(folder)
         raise ConfigError(
-            f"hydra.run.dir: expected a folder without checkpoints, found {kept[0]}; choose another one"
+            f"hydra.run.dir: expected a folder of no other run, found {kept[0]}; choose another one"
             + (f", or go on with resume={last}" if last else "")
         )
 

@@ -36,8 +36,13 @@ def start(main: Callable[[], None]) -> None:
         run(main)
     except (HydraException, OmegaConfBaseException) as error:
         said = str(error).split("Config search path:")[0].splitlines()  # of use to developers alone
-        kept = [line for line in said if not line.startswith("To append") and not line.endswith("_schema")]
+        kept = [line for line in said if _helps(line)]
         end("\n".join([*kept, *_cause(error)]), 2)
+
+
+def _helps(line: str) -> bool:
+    """Whether a line of Hydra's is of use: of what can be appended, experiments alone are not there already."""
+    return "+experiment=" in line or not (line.startswith("To append") or line.endswith("_schema"))
 
 
 def _cause(error: Exception) -> list[str]:

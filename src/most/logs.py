@@ -20,7 +20,7 @@ class LoggerSettings:
     kind: str = "wandb"
     project: str = "most"
     group: str | None = None
-    mode: str = "offline"  # online needs WANDB_API_KEY
+    mode: str = "offline"  # online needs an account
     pictures: int = 2  # BEV pictures of the validation split, a validation
 
     def __post_init__(self) -> None:
@@ -31,6 +31,26 @@ class LoggerSettings:
         if self.pictures < 0:
             raise ConfigError(f"logger.pictures: expected a number >= 0, found {self.pictures}")
 
+    def check_account(self) -> None:
+        """Refuse to log online where W&B finds no key: neither WANDB_API_KEY nor that of ``wandb login``.
+
+        In a terminal W&B asks for one first.
+        """
+        if self.kind == "wandb" and self.mode == "online" and not self._logged_in():
+            raise ConfigError(
+                "logger.mode: expected a key for online, found none; run wandb login, set WANDB_API_KEY, or leave it "
+                "offline, and wandb sync the run's folder later"
+            )
+
+    def _logged_in(self) -> bool:
+        import wandb
+
+        os.environ["WANDB_MODE"] = self.mode
+        try:
+            return wandb.login(verify=False)
+        except wandb.errors.UsageError:  # no key, and no terminal to ask in
+            return False
+
     def build(self, folder: Path, name: str, config: dict[str, Any]) -> "Logger | bool":
         """Start the logger of a run whose files go to ``folder``."""
         from lightning.pytorch.loggers import CSVLogger, WandbLogger  # seconds, which only a training has to wait
@@ -39,6 +59,5 @@ class LoggerSettings:
             return False
         if self.kind == "csv":
             return CSVLogger(folder, name="csv", version="")
-        online = self.mode == "online" and "WANDB_API_KEY" in os.environ
-        os.environ["WANDB_MODE"] = "online" if online else "offline"  # WandbLogger's own switch refuses log_model
+        os.environ["WANDB_MODE"] = self.mode  # WandbLogger's own switch refuses log_model
         return WandbLogger(name=name, save_dir=folder, project=self.project, group=self.group, config=config)

@@ -78,6 +78,11 @@ def test_a_refused_training_leaves_what_a_finished_one_was_told(folder: Path, ch
     assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
 
 
+def test_a_forgotten_plus_sign_is_shown(folder: Path) -> None:
+    message = refused(folder, "train", "experiment=sim_demo", *TRAIN[1:])
+    assert "To append to your default list use +experiment=sim_demo" in message
+
+
 def cut(path: Path, size: int) -> None:
     path.write_bytes(path.read_bytes()[:size])
 
@@ -209,7 +214,7 @@ def test_folders_with_other_content_are_refused(folder: Path, checkpoint: Path) 
     message = refused(folder, "simulate", "simulation=demo", "out=tree", "simulation.sequences=['00']")
     assert "expected no folder or a simulated sequence, found other files; choose another out" in message
     message = refused(folder, "train", *TRAIN, f"hydra.run.dir={checkpoint.parents[1]}")
-    assert "expected a folder without checkpoints, found" in message
+    assert "expected a folder of no other run, found" in message
     assert f"resume={checkpoint}" in message
 
 
