@@ -1,6 +1,7 @@
 # A fresh machine needs Python >= 3.11 and its venv module; every target below sets up what it uses.
 PYTHON ?= python3
-TORCH ?= torch==2.13.0# pinned first: left to pip, torch brings gigabytes of CUDA; for a GPU: make setup TORCH=torch
+TORCH ?= torch==2.13.0
+TORCH_INDEX ?= https://download.pytorch.org/whl/cpu# without gigabytes of CUDA; for a GPU: https://pypi.org/simple
 VENV ?= .venv
 DEVKIT ?= .devkit
 DEMO ?= demo
@@ -11,14 +12,14 @@ SIZE ?= small
 RUN = $(VENV)/bin/python
 READY = $(VENV)/.ready
 
-.PHONY: setup devkit demo velocity ablation test lint bench clean
+.PHONY: setup devkit demo velocity ablation test lint bench clean distclean
 
 setup: $(READY)
 
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(RUN) -m pip install --quiet --upgrade pip
-	$(RUN) -m pip install --quiet "$(TORCH)"
+	$(RUN) -m pip install --quiet --extra-index-url $(TORCH_INDEX) "$(TORCH)"
 	$(RUN) -m pip install --quiet --editable '.[dev]'
 	touch $(READY)
 
@@ -117,4 +118,7 @@ bench: setup
 	$(RUN) benchmarks/network.py
 
 clean:
-	rm -rf $(VENV) $(DEVKIT) $(DEMO) $(VELOCITY) $(ABLATION) build dist outputs multirun .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(DEVKIT) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+
+distclean: clean
+	rm -rf $(DEMO) $(VELOCITY) $(ABLATION)
