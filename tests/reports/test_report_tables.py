@@ -146,6 +146,40 @@ def test_memberships_are_compared_on_the_same_stage_1(tmp_path: Path) -> None:
     assert rows["PointSegMLP (semantic + geometric)"].cells["PQ"].value == 0
 
 
+def test_each_membership_is_compared_with_the_nearest_centres_on_its_own_stage_1(tmp_path: Path) -> None:
+    """A sweep that trains both stages for each membership, none of which changes anything."""
+    for membership, quality in (("full", 0.5), ("geometric", 0.9)):
+        for seed in (1, 2):
+            sums = example_sums(quality, seed)
+            example_run(tmp_path / f"{membership}{seed}", sums, seed=seed, membership=membership, nearest=sums)
+    (found,) = group(find_runs(tmp_path).scored)
+    analysis, ways = Analysis(found, 200, 1), memberships(found)
+    table = difference_table(ways, analysis, None)
+    assert [(row.parts, row.cells["PQ"].value) for row in table.blocks[0].rows] == [([[1], [2]], 0)] * 2
+    order = order_table({"table1": amodalization(found), "table2": ways}, analysis)
+    assert order.words["geometric above nearest"].startswith("open")
+    assert order.words["full above geometric"] == "no seed, or no stage 1, in common"
+
+
+def test_offsets_are_shown_as_most_trainings_were_scored(tmp_path: Path) -> None:
+    """One of three was scored in another way, too."""
+    for seed in (1, 2, 3):
+        run = example_run(tmp_path / f"{seed}", example_sums(0.7, seed), seed=seed, heads="offset_regression")
+    wide = {"prediction": {"membership": "mean_shift", "changed": ["membership.bandwidth=5"]}}
+    (run / "evaluated").mkdir()
+    (run / "evaluated" / "wide.json").write_text(json.dumps({"panoptic": {"sums": example_sums(0.1, 1)}} | wide))
+    (found,) = group(find_runs(tmp_path).scored)
+    (row,) = amodalization(found).rows.values()
+    assert row.membership == "mean_shift"
+
+
+def test_table_2_stands_on_the_papers_stage_1_where_as_much_was_tried_on_others(tmp_path: Path) -> None:
+    for extent in ("amodal", "shrink_wrap", "track_max"):
+        example_run(tmp_path / extent, example_sums(0.7, 1), extent=extent, nearest=example_sums(0.6, 1))
+    (found,) = group(find_runs(tmp_path).scored)
+    assert "(SW), w/ sharing" in memberships(found).notes[0]
+
+
 def test_the_accuracy_of_clusterings_is_of_other_points_and_left_out(tmp_path: Path) -> None:
     example_run(tmp_path, example_sums(0.7, 1), nearest=example_sums(0.6, 1))
     (tmp_path / "evaluated").mkdir()
@@ -156,6 +190,20 @@ def test_the_accuracy_of_clusterings_is_of_other_points_and_left_out(tmp_path: P
     assert "Membership Acc" not in ours(table)["Clustering (training-free)"]
     assert "Membership Acc" in ours(table)["Nearest neighbour (baseline)"]
     assert OWN_REGIONS in table.notes
+
+
+def test_rows_without_accuracy_are_not_in_its_plot_and_take_no_legend_from_others(tmp_path: Path) -> None:
+    run = example_run(tmp_path, example_sums(0.7, 1), membership="geometric", stage={"run": ["detection"]})
+    (run / "metrics.json").unlink()
+    (run / "evaluated").mkdir()
+    for name in ("clustering", "full"):
+        (run / "evaluated" / f"{name}.json").write_text(json.dumps({"panoptic": {"sums": example_sums(0.8, 2)}}))
+    (found,) = group(find_runs(tmp_path).scored)
+    parts = {"table1": amodalization(found), "table2": memberships(found)}
+    plot = next(each for each in plots(parts, Analysis(found, 200, 1)) if each.name == "membership")
+    assert "Clustering" not in plot.meaning
+    assert re.search(r"full\) \d+\.\d, \d+\.\d", plot.meaning)
+    assert "contested" in plot.svg
 
 
 def test_rows_of_one_training_are_named_where_others_have_more(tmp_path: Path) -> None:
@@ -250,7 +298,7 @@ def test_orders_are_said_with_their_confidence(analysis: Analysis) -> None:
         *(analysis.group.by_seed(each) for each in analysis.group.strategies[:2]), {"": "pq"}
     )
     assert verdict(interval[""], 2)
-    assert verdict(None, 0) == "no seed in common"
+    assert verdict(None, 0) == "no seed, or no stage 1, in common"
 
 
 def test_benchmarks_have_the_papers_columns(analysis: Analysis) -> None:

@@ -83,6 +83,7 @@ def test_unfinished_runs_and_those_without_sums_are_left_out_with_a_reason(tmp_p
         (".hydra/config.yaml", "{", r"config\.yaml: expected what Hydra wrote"),
         (".hydra/config.yaml", "{stage: {run: [detection]}}", r"config\.yaml: expected a configuration of most.train"),
         (".hydra/hydra.yaml", "{}", r"hydra\.yaml: expected hydra.runtime.choices"),
+        (".hydra/hydra.yaml", "hydra: x", r"hydra\.yaml: expected hydra.runtime.choices"),
         (".hydra/overrides.yaml", "!!python/object/apply:os.getcwd []", r"overrides\.yaml: expected what Hydra wrote"),
         ("metrics.json", "[]", r"metrics\.json: expected a report"),
         ("metrics.json", '{"panoptic": {"sums": {"classes": 3}}}', r"metrics\.json: expected the sums of held-out"),
@@ -94,6 +95,16 @@ def test_a_damaged_run_is_left_out_by_name(tmp_path: Path, name: str, content: s
     found = find_runs(tmp_path)
     assert [run.folder for run in found.scored] == [whole]
     assert re.search(message, found.left_out[damaged])
+
+
+def test_nothing_of_a_damaged_run_is_counted(tmp_path: Path) -> None:
+    run = example_run(tmp_path, example_sums(0.7, 1))
+    evaluated(run, "clustering", membership="clustering", changed=None)
+    assert len(find_runs(tmp_path).scored) == 2
+    (run / "metrics.json").write_text("[]")
+    found = find_runs(tmp_path)
+    assert not found.scored
+    assert list(found.left_out) == [run]
 
 
 @pytest.mark.parametrize("change", [("tp", [1]), ("iou", [-1.0] * 20), ("membership", [1, 2]), ("scans", None)])
@@ -126,6 +137,7 @@ def test_other_sequences_or_settings_are_groups_of_their_own_that_say_what_tells
         example_run(tmp_path / "main" / str(number), example_sums(0.7, 1), extent=extent)
     example_run(tmp_path / "sequences", example_sums(0.7, 1, sequences=("07",)))
     example_run(tmp_path / "settings", example_sums(0.7, 1), backbone={"widths": [8, 8]})
+    example_run(tmp_path / "validated", example_sums(0.7, 1), trainer={"validate_every": 1})
     example_run(tmp_path / "precision", example_sums(0.7, 1), trainer={"precision": "16-mixed"})
     other_scans = example_sums(0.7, 1)
     other_scans["sequences"]["09"]["true"][1] += 1
@@ -134,7 +146,7 @@ def test_other_sequences_or_settings_are_groups_of_their_own_that_say_what_tells
     assert len(first.rows) == 2
     assert "backbone.widths=[4, 8]" in first.title
     assert {len(each.rows) for each in others} == {1}
-    assert sorted("1 sequence (07)" in each.title for each in others) == [False, False, False, True]
+    assert sorted("1 sequence (07)" in each.title for each in others) == [False] * 4 + [True]
     assert sum("trainer.precision=16-mixed" in each.title for each in others) == 1
 
 

@@ -39,20 +39,26 @@ class Ablation:
         """A row's title."""
         return strategy.membership_title if self.beside else strategy.title
 
-    def runs(self, group: Group, strategy: Strategy) -> BySeed:
-        """A row's runs."""
-        return group.by_seed(strategy, self.beside)
+    def runs(self, group: Group, strategy: Strategy, like: BySeed | None = None) -> BySeed:
+        """A row's runs; where there are several of a seed, those on the stage 1 of ``like``."""
+        return group.by_seed(strategy, self.beside, like)
+
+    def pair(self, group: Group, strategy: Strategy, other: Strategy) -> tuple[BySeed, BySeed]:
+        """Two rows' runs, on the same stages 1 where there are such."""
+        others = self.runs(group, other, self.runs(group, strategy))
+        return self.runs(group, strategy, others), others
 
 
 def amodalization(group: Group) -> Ablation:
     """Table I: with the membership that most strategies were scored with, the fullest of several.
 
-    Offsets have no detected centres, so theirs is their own.
+    Offsets have no detected centres, so theirs is their own, the one that most trainings were scored with.
     """
     by_membership = _by(group.strategies, lambda each: each.membership if each.has_centres else "")
-    offsets = by_membership.pop("", [])
+    offsets = _by(by_membership.pop("", []), lambda each: each.detection).values()
+    fullest = [max(ways, key=lambda each: len(group.by_seed(each))) for ways in offsets]
     widest = max(by_membership.values(), key=lambda rows: (len(rows), rows[0].order[-2:]), default=[])
-    rows = {each.detection: each for each in [*offsets, *widest]}
+    rows = {each.detection: each for each in [*fullest, *widest]}
     ways = dict.fromkeys(each.membership_title for each in rows.values())
     notes = (f"Membership here: {'; '.join(ways)}.", *_settings(group), PRESENT)
     notes += (SMALL,) if any(each.extent.startswith("drop_small") for each in rows.values()) else ()
@@ -61,10 +67,10 @@ def amodalization(group: Group) -> Ablation:
 
 
 def memberships(group: Group) -> Ablation:
-    """Table II: on the stage 1 that most memberships were tried on, the paper's MAX of several."""
+    """Table II: on the stage 1 that most memberships were tried on, of several the paper's: SW."""
     found = max(
         _by(group.strategies, lambda each: each.detection).values(),
-        key=lambda rows: (len(rows), rows[0].extent == "track_max"),
+        key=lambda rows: (len(rows), rows[0].detection == "shrink_wrap"),
     )
     notes = (f"Stage 1 here: {found[0].title}.", *_settings(group), CONTESTED, PRESENT)
     notes += () if all(each.has_regions for each in found) else (OWN_REGIONS,)

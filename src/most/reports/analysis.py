@@ -78,7 +78,9 @@ class Analysis:
     @cached_property
     def _presence(self) -> Presence:
         rows = self.group.rows.values()
-        return Presence.of([run.sums for row in rows for source in row.values() for run in source.values()])
+        return Presence.of(
+            [run.sums for row in rows for source in row.values() for found in source.values() for run in found]
+        )
 
 
 def _reported(run: Scored, key: str) -> float | None:

@@ -30,7 +30,8 @@ FEW = f"Bins of fewer than {FEWEST} objects have no figure."
 SEEN = (
     "How much of an object is seen: how long its points reach over ground in the scan, of the longest that they ever "
     f"do in the sequence. {OFFICIAL} False segments count for the object that most of their points are of. Left out "
-    f"are those of no object, and objects that are there in one scan alone. {FEW}"
+    "are those of no object, and objects that are there in one scan alone. What is little seen, and yet has points "
+    f"enough to count, is large and near, and so may have the higher PQ: rows are compared within a bin. {FEW}"
 )
 
 

@@ -10,10 +10,11 @@ from most.reports.runs import BESIDE, EVALUATED, VALIDATED, Scored
 from most.reports.settings import NO_FIGURE, is_of
 from most.reports.strategy import AXES, Strategy, plain_names
 from most.reports.sums import Measured
+from most.reports.units import BySeed
 
 ASIDE = (  # what else runs that are compared may differ in: who ran them and where, and what makes rows of them
     *("seed", "stage1", "dataset.root", "stage.run", "backbone.separate"),
-    *(f"trainer.{name}" for name in ("accelerator", "devices", "strategy", "validate_every")),
+    *(f"trainer.{name}" for name in ("accelerator", "devices", "strategy")),
     *(*NO_FIGURE, *AXES),
 )
 SOURCES = (EVALUATED, VALIDATED, BESIDE)  # of two with the same strategy and seed, the first is taken
@@ -27,25 +28,34 @@ class Group:
     dataset: str
     measured: Measured
     settings: list[str] = field(default_factory=list)  # of strategies, where the command line changed them in all runs
-    rows: dict[Strategy, dict[str, dict[int, Scored]]] = field(default_factory=dict)  # by source and seed
+    rows: dict[Strategy, dict[str, dict[int, list[Scored]]]] = field(default_factory=dict)  # by source and seed
 
     def add(self, scored: Scored) -> None:
-        """Add a run; two of the same strategy and seed are a DataError, since no one could say which counts."""
-        seeds = self.rows.setdefault(scored.strategy, {}).setdefault(scored.source, {})
-        other = seeds.setdefault(scored.seed, scored)
-        if other is not scored and scored.source != BESIDE:
+        """Add a run; two of the same strategy and seed are a DataError, since no one could say which counts.
+
+        Nearest centres beside the runs that trained stage 2 may be of several stages 1.
+        """
+        found = self.rows.setdefault(scored.strategy, {}).setdefault(scored.source, {}).setdefault(scored.seed, [])
+        found.append(scored)
+        if len(found) > 1 and scored.source != BESIDE:
             unused = "" if scored.strategy.has_centres else f" ({scored.strategy.heads} uses no extent)"
             raise DataError(
                 f"{scored.folder}: expected one run of {scored.strategy.detection}{unused}, membership "
-                f"{scored.strategy.membership}, seed {scored.seed}, found another in {other.folder}; keep one in runs"
+                f"{scored.strategy.membership}, seed {scored.seed}, found another in {found[0].folder}; "
+                "keep one in runs"
             )
 
-    def by_seed(self, strategy: Strategy, beside: bool = False) -> dict[int, Scored]:
-        """Return a strategy's runs; of two with a seed, ``beside`` takes that of the run that trained stage 2."""
+    def by_seed(self, strategy: Strategy, beside: bool = False, like: BySeed | None = None) -> dict[int, Scored]:
+        """Return a strategy's runs; of two with a seed, ``beside`` takes that of the run that trained stage 2.
+
+        Of several beside others, the one on the stage 1 that ``like`` has of that seed is taken.
+        """
         sources = (EVALUATED, BESIDE, VALIDATED) if beside else SOURCES
         found: dict[int, Scored] = {}
         for source in reversed(sources):
-            found |= self.rows[strategy].get(source, {})
+            for seed, runs in self.rows[strategy].get(source, {}).items():
+                wanted = like[seed].stage1 if like and seed in like else None
+                found[seed] = next((run for run in runs if run.stage1 == wanted), runs[0])
         return found
 
     @property

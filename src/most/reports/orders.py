@@ -65,7 +65,7 @@ def order_table(ablations: Mapping[str, Ablation], analysis: Analysis) -> Table 
         if not {claim.worse, claim.better} <= ablation.rows.keys():
             continue
         title = " above ".join(NAMES.get(name, name) for name in (claim.better, claim.worse))
-        better, worse = (ablation.runs(analysis.group, ablation.rows[name]) for name in (claim.better, claim.worse))
+        better, worse = ablation.pair(analysis.group, ablation.rows[claim.better], ablation.rows[claim.worse])
         differences = analysis.differences(better, worse, COLUMNS)
         rows.append(Row(title, differences | _papers(claim), units(better, worse)))
         said[title] = verdict(differences["PQ"], len(rows[-1].parts))
@@ -91,7 +91,7 @@ def _papers(claim: Claim) -> Cells:
 def verdict(difference: Interval | None, trainings: int) -> str:
     """Say how surely a difference, of as many pairs of trainings, is above 0."""
     if difference is None:
-        return "no seed in common"
+        return "no seed, or no stage 1, in common"
     if difference.low is None or difference.high is None or difference.above is None:
         return "no interval: one training, one sequence"
     agree = f"({100 * difference.above:.1f} % of draws agree)"

@@ -57,28 +57,24 @@ def _bars(name: str, title: str, ablation: Ablation, analysis: Analysis, keys: d
     """A line for each row: mean and interval, and each seed as a dot."""
     rows = {ablation.title_of(each): ablation.runs(analysis.group, each) for each in ablation.rows.values()}
     found = {row: analysis.cells(runs, keys) for row, runs in rows.items()}
-    if not any(cell for cells in found.values() for cell in cells.values()):
+    rows = {row: runs for row, runs in rows.items() if any(found[row].values())}
+    if not rows:
         return None
     with mpl.rc_context(STYLE):
         figure, axes = _figure(0.45 * len(rows) * len(keys) + 1)
         for series, (label, key) in enumerate(keys.items()):
+            shown = [row for row in rows if found[row][label]]
             for place, (row, runs) in enumerate(rows.items()):
                 at = place + 0.25 * (series - (len(keys) - 1) / 2)
-                _bar(
-                    axes,
-                    at,
-                    found[row][label],
-                    analysis.by_seed(runs, key).values(),
-                    series,
-                    label if not place else None,
-                )
+                seeds = analysis.by_seed(runs, key).values()
+                _bar(axes, at, found[row][label], seeds, series, label if row in shown[:1] else None)
         axes.set_yticks(range(len(rows)), [_plain(row) for row in rows])
         axes.invert_yaxis()
         axes.set_xlabel("%")
         axes.grid(axis="x", alpha=0.2, color=INK)
         if len(keys) > 1:
             axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=len(keys))
-        said = "; ".join(f"{row} {_said(cells)}" for row, cells in found.items())
+        said = "; ".join(f"{row} {_said(found[row])}" for row in rows)
         meaning = f"{title}, with 95 % intervals; small dots are seeds. {said}. {PAIRED}"
         return Plot(name, title, meaning, _svg(figure, name))
 

@@ -68,16 +68,19 @@ def find_runs(folder: Path) -> Runs:
 
 
 def _read(folder: Path, runs: Runs) -> None:
-    """Add what a run was scored by, or why it cannot be; other programs' folders are none of ours."""
+    """Add what a run was scored by, or why it cannot be; other programs' folders are none of ours.
+
+    Of a damaged run, which is a DataError, nothing is added.
+    """
     config = _yaml(folder / ".hydra" / FILES[0], dict)
     if "stage" not in config:
         return
     hydra, overrides = (
         _yaml(folder / ".hydra" / name, kind) for name, kind in zip(FILES[1:], (dict, list), strict=True)
     )
-    runtime = (hydra.get("hydra") or {}).get("runtime") or {}
-    choices = runtime.get("choices")
-    if not isinstance(choices, dict) or not {"extent", "membership", "dataset"} <= choices.keys():
+    runtime = _part(_part(hydra, "hydra"), "runtime")
+    choices = _part(runtime, "choices")
+    if not {"extent", "membership", "dataset"} <= choices.keys():
         raise DataError(f"{folder / '.hydra/hydra.yaml'}: expected hydra.runtime.choices of most.train, found none")
     try:
         strategy = strategy_of(config, choices, overrides)
@@ -86,17 +89,16 @@ def _read(folder: Path, runs: Runs) -> None:
         raise DataError(
             f"{folder / '.hydra/config.yaml'}: expected a configuration of most.train, found none ({error!r})"
         ) from error
-    found, stage1 = 0, _stage1(config, runtime, folder)
+    scored, left_out, stage1 = [], {}, _stage1(config, runtime, folder)
     for report, path, membership, section, source in _reports(folder, config, strategy.membership):
         if (sums := report[section].get("sums")) is None:
-            runs.left_out[path] = "has no sums of sequences: written by an earlier version"
+            left_out[path] = "has no sums of sequences: written by an earlier version"
             continue
         way = replace(strategy, membership=membership)
         sums, told = read_sums(sums, f"{path}"), _told(report) if source == EVALUATED else ()
-        runs.scored.append(Scored(folder, source, seed, way, config, choices, report, sums, stage1, told))
-        found += 1
-    if not found and not any(folder in path.parents for path in runs.left_out):
-        runs.left_out[folder] = _unfinished(folder, config)
+        scored.append(Scored(folder, source, seed, way, config, choices, report, sums, stage1, told))
+    runs.scored += scored
+    runs.left_out |= left_out if scored or left_out else {folder: _unfinished(folder, config)}
 
 
 def _reports(
@@ -129,7 +131,7 @@ def _predicted_by(report: Mapping[str, Any], name: str, trained: str) -> str:
 def _told(report: Mapping[str, Any]) -> tuple[str, ...] | None:
     """Return what prediction was told besides defaults; None for a report that does not say."""
     prediction = report.get("prediction")
-    return tuple(map(str, prediction.get("changed", ()))) if isinstance(prediction, Mapping) else None
+    return tuple(map(str, prediction.get("changed") or ())) if isinstance(prediction, Mapping) else None
 
 
 def _stage1(config: Mapping[str, Any], runtime: Mapping[str, Any], folder: Path) -> str:
@@ -148,11 +150,17 @@ def _resolved(config: Mapping[str, Any], key: str) -> str:
         return str(config[key])
 
 
+def _part(settings: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """Return a part of what Hydra wrote; an empty one where there is none."""
+    part = settings.get(name)
+    return part if isinstance(part, dict) else {}
+
+
 def _unfinished(folder: Path, config: Mapping[str, Any]) -> str:
     if (folder / "metrics.json").is_file():
         return "unfinished: stage 2 has not ended"
     kept = sorted((folder / "checkpoints").glob("*-last.ckpt"))
-    return f"unfinished: goes on with resume={kept[-1]}" if kept else "unfinished: no metrics.json"
+    return f"unfinished: goes on with resume={folder} hydra.run.dir={folder}" if kept else "unfinished: no metrics.json"
 
 
 def _yaml(path: Path, kind: type) -> Any:

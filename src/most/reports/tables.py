@@ -38,10 +38,10 @@ def difference_table(ablation: Ablation, analysis: Analysis, baseline: str | Non
     """Differences of all rows to ``baseline``, if it is one of them; None where there is no other."""
     wanted = baseline if baseline in ablation.rows else ablation.first
     base = ablation.rows.get(wanted, next(iter(ablation.rows.values())))
-    others, made = ablation.runs(analysis.group, base), []
+    made = []
     for each in ablation.rows.values():
-        runs = ablation.runs(analysis.group, each)
         if each != base:
+            runs, others = ablation.pair(analysis.group, each, base)
             cells = analysis.differences(runs, others, ablation.columns)
             made.append(Row(ablation.title_of(each), cells, units(runs, others)))
     if not made:
