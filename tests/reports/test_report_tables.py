@@ -294,6 +294,8 @@ def test_orders_are_said_with_their_confidence(analysis: Analysis) -> None:
     assert rows["MAX above SW"]["paper: PQ"].value == pytest.approx(0.033)
     assert rows["full above nearest"]["paper: PQ"].value == pytest.approx(0.029)
     assert rows["full above nearest"]["paper: PQ Th"] is None  # Table II has none
+    assert rows["full above nearest"]["Membership Acc"].value == pytest.approx(0.2, abs=0.05)
+    assert rows["full above nearest"]["paper: Membership Acc"].value == pytest.approx(0.191)
     interval = analysis.differences(
         *(analysis.group.by_seed(each) for each in analysis.group.strategies[:2]), {"": "pq"}
     )

@@ -46,7 +46,7 @@ CLAIMS = [
     *(Claim(worse, better, "table2", _MEMBERSHIP[worse], _MEMBERSHIP[better]) for worse, better in _MEMBERSHIP_PAIRS),
 ]
 NAMES = EXTENTS | {"offset_regression": "offset regression", f"{SW}+separate": "SW w/o sharing"}
-COLUMNS = {"PQ": "pq", "PQ Th": "pq_things"}
+COLUMNS = {"PQ": "pq", "PQ Th": "pq_things", "Membership Acc": "membership_accuracy"}
 PAPERS = {f"paper: {column}": column for column in COLUMNS}
 NOTE = (
     "Differences, percent points. The order of PQ shows where the interval lies above 0, is reversed where it lies "
