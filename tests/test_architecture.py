@@ -12,7 +12,7 @@ import pytest
 import most
 
 ROOT = Path(most.__file__).parent
-FOUNDATION = {"structures", "errors", "files", "processes", "geometry"}
+FOUNDATION = {"structures", "errors", "files", "keys", "processes", "geometry"}
 COMPONENTS = {
     "datasets": {"modal"},
     "modal": set(),

@@ -21,6 +21,7 @@ from most.datasets.instances import check_extent
 from most.datasets.reader import Reader
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError
+from most.keys import flat
 from most.membership import PointSegMLPSettings
 from most.modal.extent import DropSmall
 from most.stages.trainer import MIXED, TrainerSettings
@@ -227,11 +228,3 @@ def _completed(saved: dict[str, Any], config: Config) -> dict[str, Any]:
 
 def _completed_part(group: str, part: dict[str, Any]) -> dict[str, Any]:
     return to_plain(group, from_plain(group, part))
-
-
-def flat(settings: dict[str, Any], before: str = "") -> dict[str, Any]:
-    """Return nested settings by dotted names."""
-    leaves: dict[str, Any] = {}
-    for key, value in settings.items():
-        leaves |= flat(value, f"{before}{key}.") if isinstance(value, dict) else {f"{before}{key}": value}
-    return leaves

@@ -17,6 +17,7 @@ from omegaconf import DictConfig
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBaseException
 
 from most.errors import ConfigError, MostError
+from most.keys import is_of
 
 KEY_ERRORS = (ConfigAttributeError, ConfigKeyError)
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -78,7 +79,7 @@ def refuse_idle(keys: Collection[str], why: str) -> None:
     told = HydraConfig.get().overrides.task if HydraConfig.initialized() else []
     for override in OverridesParser.create().parse_overrides(list(told)):
         key = override.key_or_group
-        if any(key == idle or key.startswith(f"{idle}.") for idle in keys):
+        if is_of(key, keys):
             raise ConfigError(f"{key}: expected none {why}, found {override.input_line}; leave it out")
 
 

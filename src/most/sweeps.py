@@ -17,12 +17,12 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
-from most.checks import flat, stages_to_run
+from most.checks import stages_to_run
 from most.config import Config, typed
 from most.datasets.reader import Reader
 from most.entry import end
 from most.errors import ConfigError, DataError, FailedError, MostError, StoppedError
-from most.reports.settings import NO_FIGURE, is_of
+from most.keys import NO_FIGURE, flat, is_of
 from most.run_folder import TOLD
 from most.training import METRICS, standing
 

@@ -8,9 +8,9 @@ import pytest
 
 from example_runs import example_run, example_sums, example_sweep
 from most.errors import DataError
+from most.keys import NO_FIGURE
 from most.reports.groups import group
 from most.reports.runs import find_runs
-from most.reports.settings import NO_FIGURE
 
 
 def ways(folder: Path) -> list[tuple[str, str, int, str]]:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from most.errors import DataError
+from most.keys import NO_FIGURE, flat, is_of
 from most.reports.runs import BESIDE, EVALUATED, VALIDATED, Scored
-from most.reports.settings import NO_FIGURE, is_of
 from most.reports.strategy import AXES, Strategy, plain_names
 from most.reports.sums import Measured
 from most.reports.units import BySeed
@@ -89,15 +89,9 @@ def _group(scored: list[Scored]) -> Group:
     return found
 
 
-def common_part(config: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+def common_part(config: Mapping[str, Any]) -> dict[str, Any]:
     """What has to agree, by dotted key."""
-    flat: dict[str, Any] = {}
-    for name, value in config.items():
-        key = prefix + str(name)
-        if is_of(key, ASIDE):
-            continue
-        flat |= common_part(value, f"{key}.") if isinstance(value, Mapping) else {key: value}
-    return flat
+    return {key: value for key, value in flat(config).items() if not is_of(key, ASIDE)}
 
 
 def _entitle(groups: Mapping[str, Group], kept: Mapping[str, Mapping[str, Any]]) -> None:
