@@ -4,6 +4,7 @@ import pytest
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import OmegaConf
 
+from loading_process import from_a_loading_process
 from most.entry import refuse_idle, run
 from most.errors import ConfigError, DataError, MostError
 
@@ -21,6 +22,13 @@ def test_a_users_mistake_is_its_message_alone(kind, capsys):
         run(failing(kind("scan.bin: expected points, found none")))
     assert stop.value.code == 2
     assert capsys.readouterr() == ("", "most: scan.bin: expected points, found none\n")
+
+
+def test_a_mistake_that_a_loading_process_found_is_its_message_alone(capsys):
+    with pytest.raises(SystemExit) as stop:
+        run(from_a_loading_process(DataError("scan.bin: expected points\n  found: none")).reraise)
+    assert stop.value.code == 2
+    assert capsys.readouterr() == ("", "most: scan.bin: expected points\n  found: none\n")
 
 
 @pytest.mark.parametrize("error", [ValueError("ours"), SystemExit(1)])

@@ -8,7 +8,9 @@ from hydra import compose, initialize_config_dir
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from omegaconf import OmegaConf
 
+from loading_process import from_a_loading_process
 from most.config import Config, conf_dir, register, typed
+from most.entry import run
 from most.errors import ConfigError, DataError, FailedError, MostError, StoppedError
 from most.sweeps import Job, as_job, by_key, check_jobs, in_sweep, job_name, report, standing, stopping
 from semantickitti_tree import write_sequence
@@ -184,6 +186,23 @@ def test_a_jobs_failure_can_be_passed_on(error, message):
     with pytest.raises(MostError, match=message) as failure:
         as_job(work)
     assert str(pickle.loads(pickle.dumps(failure.value))) == str(failure.value)
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (DataError("scan.bin: expected points, found none"), "scan.bin: expected points, found none"),
+        (ZeroDivisionError("division by zero"), "ZeroDivisionError: division by zero"),
+        (KeyError("Tr"), "KeyError: 'Tr'"),
+    ],
+)
+def test_a_job_that_fails_in_a_loading_process_is_reported_with_its_reason(make, capsys, error, told):
+    with pytest.raises(MostError) as failure:
+        as_job(from_a_loading_process(error).reraise)
+    with pytest.raises(SystemExit) as stop:
+        run(lambda: report([make("seed=1")], [failure.value]))
+    assert stop.value.code == 1
+    assert capsys.readouterr().err.endswith(f"outputs/most/sweep/seed-1: {told}\n")
 
 
 def test_a_job_that_failed_twice_says_what_it_failed_at_first():

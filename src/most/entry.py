@@ -16,7 +16,7 @@ from hydra.errors import HydraException
 from omegaconf import DictConfig
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBaseException
 
-from most.errors import ConfigError, MostError
+from most.errors import ConfigError, MostError, said
 from most.keys import is_of
 
 KEY_ERRORS = (ConfigAttributeError, ConfigKeyError)
@@ -62,7 +62,7 @@ def run(task: Callable[[], object], goes_on: bool = False) -> None:
     except KeyboardInterrupt:
         end("stopped; the same command goes on" if goes_on else "stopped", INTERRUPTED)
     except MostError as error:
-        end(_message(error), error.exit_code)
+        end(said(error), error.exit_code)
     except OSError as error:
         advice = {**dict.fromkeys(NO_ROOM, "make room"), **dict.fromkeys(NO_RIGHT + NO_PLACE, "choose another place")}
         if error.errno not in advice:
@@ -81,12 +81,6 @@ def refuse_idle(keys: Collection[str], why: str) -> None:
         key = override.key_or_group
         if is_of(key, keys):
             raise ConfigError(f"{key}: expected none {why}, found {override.input_line}; leave it out")
-
-
-def _message(error: MostError) -> str:
-    """The error's own text, also where a loading process sent it here inside its traceback."""
-    text, name = str(error), type(error).__name__
-    return text.rsplit(f"{name}: ", 1)[1].strip() if "Original Traceback" in text else text
 
 
 def end(message: str, code: int) -> NoReturn:

@@ -1,5 +1,6 @@
 """What a user can cause: each message says what, where, what was expected, what was found, and what to do."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -32,6 +33,16 @@ class FailedError(MostError):
     """Jobs of a sweep failed; the message says which, and why."""
 
     exit_code = 1
+
+
+def said(error: BaseException) -> str:
+    """Return an error's own text, also where a loading process sent it here inside its traceback."""
+    text = str(error)
+    if "Original Traceback" not in text:
+        return text
+    last = text.rsplit("Traceback (most recent call last):", 1)[1]
+    raised = re.search(r"^[\w.]+: (.*)", last, re.MULTILINE | re.DOTALL)  # the frames above it are indented
+    return raised[1].strip() if raised else text
 
 
 @contextmanager

@@ -21,7 +21,7 @@ from most.checks import stages_to_run
 from most.config import Config, typed
 from most.datasets.reader import Reader
 from most.entry import end
-from most.errors import ConfigError, DataError, FailedError, MostError, StoppedError
+from most.errors import ConfigError, DataError, FailedError, MostError, StoppedError, said
 from most.keys import NO_FIGURE, flat, is_of
 from most.run_folder import TOLD
 from most.training import METRICS, standing
@@ -160,12 +160,12 @@ def as_job(work: Callable[[], Any]) -> Any:
     except StoppedError as error:
         return end("interrupted; repeat the command to go on with the sweep", error.exit_code)
     except MostError as error:
-        log.error(error)
-        raise MostError(str(error)) from None
+        log.error(said(error))
+        raise MostError(said(error)) from None
     except Exception as error:
         log.exception("the job failed")
         first = _first(error)
-        raise MostError(f"{type(first).__name__}: {first}") from None
+        raise MostError(f"{type(first).__name__}: {said(first)}") from None
 
 
 @contextmanager
