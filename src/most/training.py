@@ -7,7 +7,7 @@ from typing import Any
 
 import lightning as L
 import torch
-from lightning.pytorch.callbacks import Callback, LearningRateMonitor, ModelCheckpoint, TQDMProgressBar
+from lightning.pytorch.callbacks import Callback, LearningRateMonitor, TQDMProgressBar
 from lightning.pytorch.loggers import Logger
 
 from most.assembly import (
@@ -33,7 +33,7 @@ from most.membership import PointSegMLP
 from most.metrics.report import write_report
 from most.run_folder import TOLD
 from most.stages.callbacks import Throughput
-from most.stages.checkpoints import AtomicCheckpointIO, LastCheckpoint
+from most.stages.checkpoints import AtomicCheckpointIO, BestCheckpoint, LastCheckpoint
 from most.stages.detection import DetectionStage, DetectionTraining
 from most.stages.membership import MembershipStage
 from most.stages.settings import STAGES
@@ -192,15 +192,7 @@ def _steps(config: Config, stage: Stage) -> dict[str, Any]:
 def _callbacks(config: Config, stage: Stage, folder: Path) -> list[Callback]:
     best, last = (checkpoint_path(folder, stage.name, which) for which in ("best", "last"))
     callbacks: list[Callback] = [
-        ModelCheckpoint(
-            best.parent,
-            best.stem,
-            monitor=f"{stage.prefix}val/pq",
-            mode="max",
-            save_weights_only=True,  # it is to be used, not to be gone on from
-            save_on_train_epoch_end=False,
-            enable_version_counter=False,
-        ),
+        BestCheckpoint(best, f"{stage.prefix}val/pq"),
         LastCheckpoint(last, config.trainer.save_every),
         Throughput(stage.prefix),
     ]

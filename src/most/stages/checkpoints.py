@@ -13,7 +13,7 @@ from typing import Any
 import lightning as L
 import torch
 from lightning.fabric.plugins.io.torch_io import TorchCheckpointIO
-from lightning.pytorch.callbacks import Callback
+from lightning.pytorch.callbacks import Callback, ModelCheckpoint
 from torch import distributed
 
 from most.errors import DataError, StoppedError
@@ -33,6 +33,40 @@ class AtomicCheckpointIO(TorchCheckpointIO):
                 torch.save(checkpoint, file)
         except (OSError, RuntimeError) as error:  # torch's writer turns a full disk into the latter
             raise DataError(f"{path}: expected a place to write the checkpoint, found {error}; make room") from error
+
+
+class BestCheckpoint(ModelCheckpoint):
+    """Keeps the weights that were best on the validation split at ``path``, to be used, not to be gone on from.
+
+    A run goes on in a folder that was moved, too: the best stays the best.
+    """
+
+    def __init__(self, path: Path, figure: str) -> None:
+        """``figure`` is the logged key that is to be high."""
+        super().__init__(
+            path.parent,
+            path.stem,
+            monitor=figure,
+            mode="max",
+            save_weights_only=True,
+            save_on_train_epoch_end=False,
+            enable_version_counter=False,
+        )
+
+    @property
+    def state_key(self) -> str:
+        """As Lightning's own class has it: runs that began with that go on."""
+        return super().state_key.replace(type(self).__qualname__, ModelCheckpoint.__qualname__, 1)
+
+    def load_state_dict(self, state_dict: dict[str, Any]) -> None:
+        """Take up what was reached; Lightning would forget it where the folder is another."""
+        files = ("best_model_path", "kth_best_model_path", "last_model_path")
+        moved = {name: self._here(state_dict[name]) for name in files}
+        scores = {self._here(path): score for path, score in state_dict["best_k_models"].items()}
+        super().load_state_dict({**state_dict, **moved, "best_k_models": scores, "dirpath": self.dirpath})
+
+    def _here(self, path: str) -> str:
+        return str(Path(str(self.dirpath)) / Path(path).name) if path else path
 
 
 class LastCheckpoint(Callback):
