@@ -283,7 +283,7 @@ def test_logging_online_needs_an_account_before_any_work(config, reader, tmp_pat
     monkeypatch.setattr("wandb.login", lambda verify: False)
     monkeypatch.setenv("WANDB_MODE", "offline")
     config.logger = LoggerSettings(mode="online")
-    with pytest.raises(ConfigError, match=r"logger\.mode: expected a key"):
+    with pytest.raises(ConfigError, match=r"logger\.mode: expected a key for W&B"):
         stages_to_run(config, reader, tmp_path)
 
 

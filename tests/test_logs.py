@@ -3,22 +3,10 @@
 import os
 
 import pytest
-import wandb
 from lightning.pytorch.loggers import CSVLogger, WandbLogger
 
 from most.errors import ConfigError
 from most.logs import LoggerSettings
-
-
-@pytest.fixture
-def no_account(monkeypatch, tmp_path):
-    """No key anywhere, none that W&B remembers; and what is set in the environment is put back."""
-    wandb.teardown()
-    monkeypatch.delenv("WANDB_API_KEY", raising=False)
-    monkeypatch.setenv("NETRC", str(tmp_path / "none"))
-    monkeypatch.setenv("WANDB_MODE", "disabled")
-    yield monkeypatch
-    wandb.teardown()
 
 
 def test_none_logs_nowhere(tmp_path):
@@ -44,7 +32,13 @@ def test_wandb_is_offline_unless_asked_and_knows_the_configuration(tmp_path, no_
 
 
 def test_online_needs_a_key(no_account):
-    with pytest.raises(ConfigError, match=r"logger\.mode: expected a key for online, found none; run wandb login"):
+    with pytest.raises(ConfigError, match=r"logger\.mode: expected a key for W&B online, found none; run wandb login"):
+        LoggerSettings(mode="online").check_account()
+
+
+def test_a_key_that_can_be_none_is_refused_with_the_reason(no_account):
+    no_account.setenv("WANDB_API_KEY", "abc")
+    with pytest.raises(ConfigError, match=r"logger\.mode: expected a key .*, found one that W&B does not take: .*40"):
         LoggerSettings(mode="online").check_account()
 
 

@@ -13,6 +13,31 @@ if TYPE_CHECKING:
 KINDS = ("wandb", "csv", "none")
 
 
+def check_key(setting: str, otherwise: str) -> None:
+    """Refuse to go online where W&B finds no key that can be one: neither WANDB_API_KEY nor that of ``wandb login``.
+
+    In a terminal W&B asks for one first. ``setting`` is what needs it, ``otherwise`` says what can be done without.
+    """
+    if found := _lacking_key():
+        raise ConfigError(
+            f"{setting}: expected a key for W&B online, found {found}; "
+            f"run wandb login, set WANDB_API_KEY, or {otherwise}"
+        )
+
+
+def _lacking_key() -> str | None:
+    """Return what W&B finds instead of a key."""
+    import wandb
+
+    os.environ["WANDB_MODE"] = "online"
+    try:
+        return None if wandb.login(verify=False) else "none"
+    except wandb.errors.UsageError:  # no key, and no terminal to ask in
+        return "none"
+    except (wandb.errors.Error, ValueError) as error:  # the latter of earlier versions
+        return f"one that W&B does not take: {error}"
+
+
 @dataclass
 class LoggerSettings:
     """Where losses, metrics and pictures go."""
@@ -32,24 +57,9 @@ class LoggerSettings:
             raise ConfigError(f"logger.pictures: expected a number >= 0, found {self.pictures}")
 
     def check_account(self) -> None:
-        """Refuse to log online where W&B finds no key: neither WANDB_API_KEY nor that of ``wandb login``.
-
-        In a terminal W&B asks for one first.
-        """
-        if self.kind == "wandb" and self.mode == "online" and not self._logged_in():
-            raise ConfigError(
-                "logger.mode: expected a key for online, found none; run wandb login, set WANDB_API_KEY, or leave it "
-                "offline, and wandb sync the run's folder later"
-            )
-
-    def _logged_in(self) -> bool:
-        import wandb
-
-        os.environ["WANDB_MODE"] = self.mode
-        try:
-            return wandb.login(verify=False)
-        except wandb.errors.UsageError:  # no key, and no terminal to ask in
-            return False
+        """Refuse to log online without a key."""
+        if self.kind == "wandb" and self.mode == "online":
+            check_key("logger.mode", "leave it offline, and wandb sync the run's folder later")
 
     def build(self, folder: Path, name: str, config: dict[str, Any]) -> "Logger | bool":
         """Start the logger of a run whose files go to ``folder``."""

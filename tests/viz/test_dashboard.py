@@ -1,12 +1,15 @@
 """The dashboard's layout, and the workspace that is made of it."""
 
 import json
+from pathlib import Path
 
 import pytest
+import wandb
 
-from most.dashboard import DashboardConfig
+from most import dashboard as command
+from most.dashboard import DashboardConfig, dashboard
 from most.errors import ConfigError
-from most.viz import dashboard
+from most.viz import dashboard as panels
 from most.viz.dashboard import describe, layout, workspace
 
 
@@ -35,14 +38,27 @@ def test_the_workspace_shows_every_key_and_groups_by_extent_and_membership():
     assert [key.name for key in made.runset_settings.groupby] == said["grouped_by"]
 
 
-def test_publishing_needs_a_key_an_entity_and_the_package(monkeypatch):
-    monkeypatch.delenv("WANDB_API_KEY", raising=False)
-    with pytest.raises(ConfigError, match="publish: expected entity=NAME and WANDB_API_KEY"):
-        DashboardConfig(publish=True, entity="team")
-    monkeypatch.setenv("WANDB_API_KEY", "0" * 40)
-    with pytest.raises(ConfigError, match="publish: expected entity=NAME"):
+def test_publishing_needs_a_key_an_entity_and_the_package(tmp_path, no_account):
+    with pytest.raises(ConfigError, match=r"publish: expected the user or team .* found none; say entity=NAME"):
         DashboardConfig(publish=True)
-    DashboardConfig(publish=True, entity="team")
-    monkeypatch.setattr(dashboard.importlib, "import_module", lambda name: __import__("no_such_package"))
+    config = DashboardConfig(str(tmp_path / "dashboard.json"), publish=True, entity="team")
+    with pytest.raises(ConfigError, match="publish: expected a key for W&B online, found none; run wandb login"):
+        dashboard(config)
+    assert not Path(config.out).exists()
+    no_account.setattr(panels.importlib, "import_module", lambda name: __import__("no_such_package"))
+    no_account.setenv("WANDB_API_KEY", "0" * 40)
     with pytest.raises(ConfigError, match=r"expected the package wandb-workspaces, found none; pip install"):
-        workspace([], "team", "most", "MOST")
+        dashboard(config)
+
+
+def test_what_wandb_refuses_of_a_workspace_is_said(tmp_path, no_account):
+    class Refused:
+        def save(self):
+            raise wandb.errors.CommError("no such team")
+
+    no_account.setenv("WANDB_API_KEY", "0" * 40)
+    no_account.setattr(command, "workspace", lambda *_: Refused())
+    config = DashboardConfig(str(tmp_path / "dashboard.json"), publish=True, entity="team")
+    with pytest.raises(ConfigError, match=r"publish: .* for team/most, found CommError: no such team; see that"):
+        dashboard(config)
+    assert Path(config.out).is_file()
