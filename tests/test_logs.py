@@ -1,12 +1,15 @@
 """Loggers: each kind, and that no account is needed."""
 
 import os
+from contextlib import nullcontext
 
 import pytest
+import wandb
 from lightning.pytorch.loggers import CSVLogger, WandbLogger
 
-from most.errors import ConfigError
-from most.logs import LoggerSettings
+from most.errors import ConfigError, StoppedError
+from most.logs import LoggerSettings, ended
+from wandb_run import read_run
 
 
 def test_none_logs_nowhere(tmp_path):
@@ -68,3 +71,13 @@ def test_impossible_settings_are_refused(wrong):
     ((name, value),) = wrong.items()
     with pytest.raises(ConfigError, match=rf"logger\.{name}: expected .*found {value}"):
         LoggerSettings(**wrong)
+
+
+@pytest.mark.parametrize(("stop", "code"), [(None, 0), (ZeroDivisionError(), 1), (StoppedError("resume=FILE", 130), 1)])
+def test_a_run_that_did_not_reach_its_end_is_no_finished_one(tmp_path, no_account, stop, code):
+    with pytest.raises(type(stop)) if stop else nullcontext(), ended():
+        wandb.init(dir=tmp_path, mode="offline", name="a")
+        if stop:
+            raise stop
+    assert wandb.run is None
+    assert read_run(tmp_path).exit_code == code

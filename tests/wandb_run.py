@@ -13,6 +13,7 @@ from typing import Any
 class OfflineRun:
     """What a run told W&B."""
 
+    exit_code: int | None = None  # none where it has not ended
     name: str = ""
     group: str = ""
     config: dict[str, Any] = field(default_factory=dict)
@@ -34,6 +35,8 @@ def read_run(folder: Path) -> OfflineRun:
         if record["type"] == "run" and "config" in content:
             run.name, run.group = content["display_name"], content.get("run_group", "")
             run.config = content["config"]["update"]
+        if record["type"] == "exit":
+            run.exit_code = content.get("exit_code", 0)
         if record["type"] == "history":
             run.last |= content["item"]
         if record["type"] == "artifact":

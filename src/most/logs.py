@@ -1,6 +1,8 @@
 """Lightning loggers: W&B (offline unless asked), CSV, or none."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,6 +38,19 @@ def _lacking_key() -> str | None:
         return "none"
     except (wandb.errors.Error, ValueError) as error:  # the latter of earlier versions
         return f"one that W&B does not take: {error}"
+
+
+@contextmanager
+def ended() -> Iterator[None]:
+    """End W&B's run with the work within, as failed where that raises: a sweep's next job is another run."""
+    import wandb
+
+    try:
+        yield
+    except BaseException:
+        wandb.finish(exit_code=1)
+        raise
+    wandb.finish()
 
 
 @dataclass

@@ -7,7 +7,6 @@ from typing import Any
 
 import hydra
 import torch
-import wandb
 from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
@@ -16,6 +15,7 @@ from most.checks import stages_to_run
 from most.config import Config, conf_dir, register, typed
 from most.datasets.datamodule import SweepDataModule
 from most.entry import run, start
+from most.logs import ended
 from most.run_folder import check_shared, gone_if_refused, write_down
 from most.stages.artifacts import log_artifacts
 from most.sweeps import as_job, by_key, chosen, in_sweep
@@ -37,13 +37,11 @@ def train(config: Config, folder: Path, told: dict[str, Any], begin: Callable[[]
     begin()
     settings: Any = OmegaConf.to_container(OmegaConf.structured(config))
     resume = str(resumed_file(Path(config.resume))) if config.resume else None
-    try:
+    with ended():
         logger = config.logger.build(folder, config.name, settings | told)
         for name in names:
             stage = run_stage(name, config, data, folder, logger, resume if name == names[0] else None)
         log_artifacts(logger, run_files(config, folder))
-    finally:
-        wandb.finish()  # the next job of a sweep runs in this process, and is another run
     return float(stage.report["panoptic"]["pq"])
 
 
