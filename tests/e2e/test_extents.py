@@ -13,6 +13,7 @@ from wandb_run import read_run
 
 DATASET = ["dataset=simulated", "dataset.root=streets", *SPLITS]
 NO_PICTURES = ["logger.pictures=0"]
+EVERY_LOSS = ["extent=amodal", "stage.detection.losses.lovasz=1"]
 QUIET = ["logger=none", *NO_PICTURES]
 
 
@@ -33,7 +34,7 @@ def succeed(folder: Path, *arguments: str) -> str:
 
 
 def test_amodal_boxes_are_trained_for_predicted_scored_and_drawn(folder: Path) -> None:
-    succeed(folder, "train", *TRAIN, *NO_PICTURES, "extent=amodal", "hydra.run.dir=amodal")
+    succeed(folder, "train", *TRAIN, *NO_PICTURES, *EVERY_LOSS, "hydra.run.dir=amodal")
     check_dashboard(folder)
     model = folder / "amodal/checkpoints/membership-last.ckpt"
     saved = torch.load(model, weights_only=True)
@@ -73,7 +74,7 @@ def check_dashboard(folder: Path) -> None:
     succeed(folder, "dashboard", "out=dashboard.json", "pictures=0")
     sections, logged = json.loads((folder / "dashboard.json").read_text())["sections"], read_run(folder / "amodal")
     keys = [key for section in sections for panel in section["panels"] for key in panel["keys"]]
-    assert "train/loss_yaw" in keys
+    assert {"train/loss_yaw", "train/loss_lovasz"} <= {*keys}
     assert [key for key in keys if not logged.logged(key)] == []
 
 

@@ -1,6 +1,7 @@
 """The dashboard's layout, and the workspace that is made of it."""
 
 import json
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ import wandb
 from most import dashboard as command
 from most.dashboard import DashboardConfig, dashboard
 from most.errors import ConfigError
+from most.losses import LossWeights
 from most.viz import dashboard as panels
 from most.viz.dashboard import describe, layout, workspace
 
@@ -24,6 +26,12 @@ def test_classes_have_curves_and_pictures_panels_in_both_stages():
     assert panels["class_pq"].keys == ["val/class_pq/car", "val/class_pq/person"]
     assert panels["membership/bev"].keys == ["membership/val/bev_1", "membership/val/bev_2"]
     assert panels["pq"].keys == ["val/pq", "membership/val/nearest_pq", "membership/val/pq"]
+
+
+def test_every_loss_that_a_stage_can_log_has_a_panel():
+    losses = {part.name for part in fields(LossWeights)} - {"class_balance"}
+    keys = {key for panel in layout([], 0)[0].panels for key in panel.keys}
+    assert keys == {"train/loss", "membership/train/loss", *(f"train/loss_{name}" for name in losses)}
 
 
 def test_the_workspace_shows_every_key_and_groups_by_extent_and_membership():

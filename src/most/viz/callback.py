@@ -1,4 +1,4 @@
-"""Pictures while training: prediction, truth and errors of the first sweeps of each validation."""
+"""Pictures while training: prediction, truth and errors of sweeps all over each validation."""
 
 from pathlib import Path
 from typing import Any

@@ -11,7 +11,9 @@ from typing import Any
 from most.errors import ConfigError
 
 GROUPED_BY = ("choices.extent", "choices.membership", "choices.heads", "backbone.separate")  # of a run's configuration
-PARTS = ("heatmap", "voxel", "point", "offset", "height", "extent", "velocity", "yaw")  # of stage 1's loss; yaw: amodal
+PARTS = (  # of stage 1's loss; that of yaws is logged with amodal boxes, Lovász's where it weighs anything
+    "heatmap", "voxel", "point", "lovasz", "offset", "height", "extent", "velocity", "yaw",
+)  # fmt: skip
 QUALITY = ("pq", "pq_things", "pq_stuff", "sq", "rq", "miou", "pq_present", "miou_present")
 ACCURACY = ("membership_accuracy", "membership_accuracy_contested")
 STAGE2 = "membership/"  # before the keys of stage 2
