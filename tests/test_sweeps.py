@@ -105,6 +105,12 @@ def test_one_job_that_cannot_run_refuses_them_all(make, wrong, message):
         check_jobs([make(*(["logger=csv"] if wrong == "logger=none" else ["seed=7"])), make(wrong)])
 
 
+def test_jobs_of_one_name_are_told_all_that_a_name_leaves_out(make):
+    jobs = [make("seed=1"), make("seed=1", "dataset.root=elsewhere")]
+    with pytest.raises(ConfigError, match=r"two of this name; .* than .*logger, .*experiment, dataset\.root$"):
+        check_jobs(jobs)
+
+
 def test_a_finished_job_is_not_looked_at_further(make):
     job = make("seed=1")
     assert not job.finished

@@ -28,6 +28,7 @@ from most.training import METRICS, standing
 
 LONGEST = 120  # characters of a folder's name
 ELSEWHERE = ("experiment", "dataset.root")  # they stand in the sweep's folder, or are too long for a name
+UNNAMED = (*NO_FIGURE, *ELSEWHERE)  # what a job's name does not say
 
 log = logging.getLogger(__name__)
 
@@ -65,7 +66,7 @@ def job_name(overrides: Sequence[str]) -> str:
     Choices come first: a long name ends in a digest.
     """
     told = [override.lstrip("+") for override in overrides]
-    kept = [override for override in told if not is_of(override.split("=")[0], (*NO_FIGURE, *ELSEWHERE))]
+    kept = [override for override in told if not is_of(override.split("=")[0], UNNAMED)]
     kept.sort(key=lambda override: ("." in override or "/" in override, override))
     name = re.sub(r"[^\w.+-]", "_", "+".join(kept).replace("=", "-")) or "default"
     if len(name) <= LONGEST:
@@ -82,7 +83,7 @@ def check_jobs(jobs: Sequence[Job]) -> None:
         if job.folder in seen:
             raise ConfigError(
                 f"{job.folder}: expected jobs that differ in what they train, found two of this name; "
-                f"sweep over something else than {', '.join(NO_FIGURE)}"
+                f"sweep over something else than {', '.join(UNNAMED)}"
             )
         seen.add(job.folder)
         try:
