@@ -6,10 +6,11 @@ import pytest
 import yaml
 from hydra import compose, initialize_config_dir
 from hydra.core.hydra_config import HydraConfig
+from omegaconf import DictConfig, OmegaConf
 
 from most.config import conf_dir, register
 from most.errors import ConfigError
-from most.run_folder import check_shared, gone_if_refused, write_down
+from most.run_folder import begun, check_shared, gone_if_refused, write_down
 from most.sweeps import Job
 
 
@@ -18,18 +19,96 @@ def refuse(folder: Path) -> None:
         raise ConfigError("no such extent")
 
 
-def test_what_a_run_was_told_is_written_by_hydras_names(tmp_path, monkeypatch):
+@pytest.fixture
+def told(monkeypatch):
+    """Tell Hydra overrides in the current folder; return the settings that it makes of them."""
     register()
-    with initialize_config_dir(str(conf_dir()), version_base=None):
-        job = Job([], compose("train", ["extent=shrink_wrap", "seed=7"], return_hydra_config=True))
-    monkeypatch.setattr(HydraConfig.instance(), "cfg", None)
-    HydraConfig.instance().set_config(job.composed)
-    write_down(tmp_path, job.settings())
+
+    def tell(*overrides: str) -> DictConfig:
+        with initialize_config_dir(str(conf_dir()), version_base=None):
+            job = Job([], compose("train", [*overrides], return_hydra_config=True))
+        OmegaConf.set_readonly(job.composed.hydra, False)
+        job.composed.hydra.runtime.cwd = str(Path.cwd())
+        monkeypatch.setattr(HydraConfig.instance(), "cfg", None)
+        HydraConfig.instance().set_config(job.composed)
+        return job.settings()
+
+    return tell
+
+
+def test_what_a_run_was_told_is_written_by_hydras_names(tmp_path, told):
+    write_down(tmp_path, told("extent=shrink_wrap", "seed=7"))
     written = {path.name: yaml.safe_load(path.read_text()) for path in (tmp_path / ".hydra").iterdir()}
     assert sorted(written) == ["config.yaml", "hydra.yaml", "overrides.yaml"]
     assert (written["config.yaml"]["seed"], "hydra" in written["config.yaml"]) == (7, False)
     assert written["hydra.yaml"]["hydra"]["runtime"]["choices"]["extent"] == "shrink_wrap"
     assert written["overrides.yaml"] == ["extent=shrink_wrap", "seed=7"]
+
+
+STAGE_2 = ("stage=membership", "stage1=runs/a", "seed=3")
+
+
+def go_on(folder: Path, settings: DictConfig) -> None:
+    with begun(folder, settings, goes_on=True):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("now", "message"),
+    [
+        ((*STAGE_2[::2],), "stage1 = runs/a, found None"),
+        ((*STAGE_2, "stage1=runs/b"), "stage1 = runs/a, found runs/b"),
+        ((*STAGE_2, "stage.hand_over=last"), "stage.hand_over = best, found last"),
+        ((*STAGE_2, "extent=shrink_wrap", "backbone=residual_unet"), "backbone = asymmetric_unet, found residual_unet"),
+    ],
+)
+def test_a_run_goes_on_with_what_it_began_with_alone(tmp_path, told, now, message):
+    with begun(tmp_path, told(*STAGE_2), goes_on=False):
+        pass
+    before = (tmp_path / ".hydra/config.yaml").read_bytes()
+    with pytest.raises(ConfigError, match=rf"{tmp_path} began with {message}; repeat the settings it began with, or"):
+        go_on(tmp_path, told(*now))
+    assert (tmp_path / ".hydra/config.yaml").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        ("resume=run", "hydra.run.dir=run"),
+        ("resume=run/checkpoints/membership-last.ckpt", "logger=none", "trainer.threads=1", "name=again"),
+        ("stage1={here}/runs/a",),
+        ("stage1=runs/../runs/a/",),
+        ("dataset.root=elsewhere",),
+    ],
+)
+def test_a_run_goes_on_by_its_own_command_whatever_changes_no_figure(tmp_path, told, monkeypatch, more):
+    monkeypatch.chdir(tmp_path)
+    with begun(tmp_path / "run", told(*STAGE_2), goes_on=False):
+        pass
+    go_on(tmp_path / "run", told(*STAGE_2, *(each.format(here=tmp_path) for each in more)))
+
+
+def test_a_run_that_was_moved_with_its_stage_1_goes_on(tmp_path, told, monkeypatch):
+    for name in ("began", "moved"):
+        (tmp_path / name / "runs/a").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path / "began")
+    with begun(tmp_path / "began/run", told(*STAGE_2), goes_on=False):
+        pass
+    (tmp_path / "began/run").rename(tmp_path / "moved/run")
+    monkeypatch.chdir(tmp_path / "moved")
+    go_on(tmp_path / "moved/run", told(*STAGE_2))
+
+
+def test_a_run_of_an_earlier_version_goes_on_with_settings_that_it_did_not_know(tmp_path, told):
+    settings = told(*STAGE_2)
+    del settings.stage.hand_over
+    with begun(tmp_path, settings, goes_on=False):
+        pass
+    go_on(tmp_path, told(*STAGE_2, "stage.hand_over=last"))
+
+
+def test_a_run_whose_settings_no_one_wrote_down_goes_on(tmp_path, told):
+    go_on(tmp_path / "run", told(*STAGE_2))
 
 
 def test_a_refused_run_leaves_no_folder_of_its_own(tmp_path):

@@ -155,7 +155,7 @@ def test_settings_that_were_cut_off_in_writing_are_named(make, text):
     leave(job, "metrics.json")
     for name in ("config.yaml", "hydra.yaml"):
         (job.folder / ".hydra" / name).write_text(text)
-    with pytest.raises(DataError, match=r"job seed-1: .*/\.hydra: expected the settings that the job began with"):
+    with pytest.raises(DataError, match=r"job seed-1: .*/\.hydra: expected the settings that the run began with"):
         check_jobs([job])
 
 

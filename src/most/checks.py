@@ -21,7 +21,7 @@ from most.datasets.instances import check_extent
 from most.datasets.reader import Reader
 from most.datasets.taxonomy import Taxonomy
 from most.errors import ConfigError
-from most.keys import flat
+from most.keys import check_same, flat
 from most.membership import PointSegMLPSettings
 from most.modal.extent import DropSmall
 from most.stages.trainer import MIXED, TrainerSettings
@@ -129,12 +129,7 @@ def check_resume(config: Config, reader: Reader, folder: Path) -> str:
     }
     for part, now in expected.items():
         began, goes_on = flat(_completed(saved[part], config)), flat(now)
-        for key in goes_on | began:
-            if began.get(key) != goes_on.get(key):
-                raise ConfigError(
-                    f"resume: {path} began with {key} = {began.get(key)}, found {goes_on.get(key)}; "
-                    "repeat the settings it began with"
-                )
+        check_same(f"resume: {path}", began, goes_on, began | goes_on, "repeat the settings it began with")
     home = path.resolve().parents[1]
     if home != folder.resolve():
         raise ConfigError(f"resume: expected the run's own folder, found {folder}; add hydra.run.dir={home}")

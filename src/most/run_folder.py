@@ -1,20 +1,23 @@
 """What stands in a run's folder from its beginning: what it was told, once that is accepted; else nothing."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any, cast
 
 from hydra.core.hydra_config import HydraConfig
 from lightning.pytorch.utilities import rank_zero_only
 from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+from yaml import YAMLError
 
-from most.errors import ConfigError
+from most.errors import ConfigError, DataError
 from most.files import atomic_write
+from most.keys import NO_FIGURE, check_same, flat, is_of
 
 TOLD = ".hydra"  # where Hydra itself would put it, but before anyone has looked whether the run may be here
-
-
+PLACES = ("dataset.root", "stage1")  # settings that name files: the same by whatever spelling
 INTERACTIVE = ("bash", "interactive")  # names of SLURM's jobs in which Lightning expects one process
 
 
@@ -33,6 +36,61 @@ def check_shared(overrides: Sequence[str]) -> None:
                 f"hydra.run.dir: expected the folder that all processes share, found none though {name}={found}; "
                 "add hydra.run.dir=FOLDER"
             )
+
+
+@contextmanager
+def begun(folder: Path, config: DictConfig, goes_on: bool) -> Iterator[None]:
+    """Begin a run in ``folder`` with what it was told, or go on with the one that began there with the same."""
+    if goes_on:
+        advice = "repeat the settings it began with, or train anew: without resume, in another folder"
+        check_beginning(folder, config, HydraConfig.get(), advice, ("dataset.root",))  # its scans are the checkpoint's
+    write_down(folder, config)
+    yield
+
+
+def check_beginning(
+    folder: Path, config: DictConfig, hydra: DictConfig, advice: str, moved: Collection[str] = ()
+) -> None:
+    """Refuse other settings or choices than those that the run in ``folder`` began with.
+
+    What one of both lacks is of a later version. ``hydra`` is Hydra's own configuration, ``moved`` names settings that
+    may be others than they were.
+    """
+    written = folder / TOLD
+    if not (written / "config.yaml").is_file():
+        return
+    (began, place), now = _written(written), told(config, hydra)
+    same = {key for key in PLACES if _one_place(place, began.get(key), now.get(key))}
+    keys = [key for key in began.keys() & now.keys() - same if not is_of(key, (*NO_FIGURE, *moved))]
+    check_same(str(folder), began, now, keys, advice)
+
+
+def _written(folder: Path) -> tuple[dict[str, Any], str]:
+    """Read what a run was told, and the folder that its relative paths stand in."""
+    try:
+        config, hydra = (DictConfig(OmegaConf.load(folder / name)) for name in ("config.yaml", "hydra.yaml"))
+        return told(config, hydra.hydra), hydra.hydra.runtime.get("cwd", "")
+    except (OSError, OmegaConfBaseException, YAMLError, ValueError, TypeError, AttributeError) as error:
+        raise DataError(
+            f"{folder}: expected the settings that the run began with, found none readable ({error}); "
+            "remove that folder where you know that they were the same, else the run's"
+        ) from error
+
+
+def told(config: DictConfig, hydra: DictConfig) -> dict[str, Any]:
+    """Return settings by dotted keys, interpolations as they were written, and choices by their groups."""
+    settings = cast(dict[str, Any], OmegaConf.to_container(config))
+    return flat(settings) | chosen(hydra.runtime.choices)
+
+
+def chosen(choices: Mapping[str, str]) -> dict[str, str]:
+    """Return which member of each group a configuration was composed of, Hydra's own groups left out."""
+    return {group: member for group, member in choices.items() if not group.startswith("hydra/")}
+
+
+def _one_place(folder: str, began: Any, now: Any) -> bool:
+    """Whether two paths, the first of them told in ``folder``, are spellings of one."""
+    return isinstance(began, str) and isinstance(now, str) and Path(folder, began).resolve() == Path(now).resolve()
 
 
 @rank_zero_only

@@ -7,23 +7,21 @@ finished, one with a ``*-last.ckpt`` goes on from it. ``hydra_plugins.most_sweep
 import hashlib
 import logging
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
-from omegaconf.errors import OmegaConfBaseException
-from yaml import YAMLError
 
 from most.checks import stages_to_run
 from most.config import Config, typed
 from most.datasets.reader import Reader
 from most.entry import end
-from most.errors import ConfigError, DataError, FailedError, MostError, StoppedError, said
-from most.keys import NO_FIGURE, flat, is_of
-from most.run_folder import TOLD
+from most.errors import ConfigError, FailedError, MostError, StoppedError, said
+from most.keys import NO_FIGURE, is_of
+from most.run_folder import check_beginning
 from most.training import METRICS, standing
 
 LONGEST = 120  # characters of a folder's name
@@ -110,30 +108,10 @@ def _check(job: Job, readers: dict[str, Reader]) -> None:
 
 
 def _check_beginning(job: Job) -> None:
-    """Refuse a folder in which a run of other settings began; those that one of them lacks are of a later version."""
-    written = job.folder / TOLD
-    if not (job.finished or standing(job.folder)) or not (written / "config.yaml").is_file():
-        return
-    began = _written(written)
-    now = flat(_plain(job.settings())) | chosen(job.composed.hydra.runtime.choices)
-    for key in began.keys() & now.keys():
-        if began[key] != now[key] and not is_of(key, NO_FIGURE):
-            raise ConfigError(
-                f"{job.folder} began with {key} = {began[key]}, found {now[key]}; "
-                "repeat the settings it began with, or choose another hydra.sweep.dir"
-            )
-
-
-def _written(folder: Path) -> dict[str, Any]:
-    """Read the settings, by dotted keys, and the choices that were written down of a run."""
-    try:
-        settings, hydra = (OmegaConf.load(folder / name) for name in ("config.yaml", "hydra.yaml"))
-        return flat(_plain(settings)) | chosen(hydra.hydra.runtime.choices)
-    except (OSError, OmegaConfBaseException, YAMLError, ValueError, TypeError, AttributeError) as error:
-        raise DataError(
-            f"{folder}: expected the settings that the job began with, found none readable ({error}); "
-            "remove that folder where you know that they were the same, else the job's"
-        ) from error
+    """Refuse a folder in which a run of other settings began."""
+    if job.finished or standing(job.folder):
+        advice = "repeat the settings it began with, or choose another hydra.sweep.dir"
+        check_beginning(job.folder, job.settings(), job.composed.hydra, advice)
 
 
 def in_sweep(config: Config, sweep: str, folder: Path) -> Config:
@@ -142,11 +120,6 @@ def in_sweep(config: Config, sweep: str, folder: Path) -> Config:
     config.name = folder.name
     config.resume = config.resume or standing(folder)
     return config
-
-
-def chosen(choices: Mapping[str, str]) -> dict[str, str]:
-    """Return which member of each group a configuration was composed of, Hydra's own groups left out."""
-    return {group: member for group, member in choices.items() if not group.startswith("hydra/")}
 
 
 def by_key(overrides: Sequence[str]) -> dict[str, str]:
@@ -198,10 +171,3 @@ def _first(error: BaseException) -> BaseException:
     while error.__context__ is not None and not error.__suppress_context__:
         error = error.__context__
     return error
-
-
-def _plain(config: Any) -> dict[str, Any]:
-    plain = OmegaConf.to_container(config)  # environment variables as they were written
-    if not isinstance(plain, dict):
-        raise TypeError(f"no mapping but {type(plain).__name__}")
-    return {str(key): value for key, value in plain.items()}

@@ -174,6 +174,7 @@ def test_a_run_goes_on_with_its_own_settings_in_its_own_folder_alone(run):
         "stage.membership.epochs=3": "began with training.epochs = 2, found 3",
         "encoder.widths=[8,8]": "began with parts.encoder.settings.widths = [8, 4], found [8, 8]",
         "seed=2": "began with seed = 1, found 2",
+        "stage.hand_over=last": "run began with stage.hand_over = best, found last",
         "hydra.run.dir=other": "expected the run's own folder, found",
     }.items():
         refused = most(run, "train", *arguments, "hydra.run.dir=run", change)
