@@ -1,16 +1,22 @@
 """A run's folder holds what the run was told once that is accepted; a refused run leaves all as it was."""
 
+import multiprocessing
+import signal
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import pytest
 import yaml
 from hydra import compose, initialize_config_dir
 from hydra.core.hydra_config import HydraConfig
+from lightning.pytorch.utilities import rank_zero_only
 from omegaconf import DictConfig, OmegaConf
 
 from most.config import conf_dir, register
 from most.errors import ConfigError
-from most.run_folder import begun, check_shared, gone_if_refused, write_down
+from most.run_folder import begun, check_shared, gone_if_refused, held, write_down
 from most.sweeps import Job
 
 
@@ -45,6 +51,7 @@ def test_what_a_run_was_told_is_written_by_hydras_names(tmp_path, told):
     assert written["overrides.yaml"] == ["extent=shrink_wrap", "seed=7"]
 
 
+FORK = multiprocessing.get_context("fork")
 STAGE_2 = ("stage=membership", "stage1=runs/a", "seed=3")
 
 
@@ -109,6 +116,64 @@ def test_a_run_of_an_earlier_version_goes_on_with_settings_that_it_did_not_know(
 
 def test_a_run_whose_settings_no_one_wrote_down_goes_on(tmp_path, told):
     go_on(tmp_path / "run", told(*STAGE_2))
+
+
+def in_another_process(work: Callable[..., None], *arguments: object) -> BaseProcess:
+    process = FORK.Process(target=work, args=arguments)
+    process.start()
+    return process
+
+
+def train_for_ever(folder: Path, heard: Connection, loading_heard: Connection) -> None:
+    """Train in a folder, beside a loading process, which outlives a training that is killed."""
+    with held(folder):
+        in_another_process(loading_heard.recv)
+        heard.send("begun")
+        signal.pause()
+
+
+def try_to_train(folder: Path, heard: Connection) -> None:
+    try:
+        with held(folder):
+            heard.send("trained")
+    except ConfigError as error:
+        heard.send(str(error))
+
+
+def test_a_folder_is_one_process_alone_until_that_is_killed(tmp_path):
+    training, training_heard = FORK.Pipe()
+    loading, loading_heard = FORK.Pipe()
+    process = in_another_process(train_for_ever, tmp_path, training_heard, loading_heard)
+    said = rf"hydra\.run\.dir: expected a folder that no other process trains in, found {tmp_path}; wait"
+    try:
+        assert training.recv() == "begun"
+        with pytest.raises(ConfigError, match=said), held(tmp_path):
+            pass
+        process.kill()
+        process.join()
+        with held(tmp_path):
+            pass
+    finally:
+        process.kill()
+        loading.send("end")
+
+
+def test_a_folder_is_free_again_after_each_run_of_a_process(tmp_path):
+    here, there = FORK.Pipe()
+    for _ in range(2):
+        with held(tmp_path):
+            in_another_process(try_to_train, tmp_path, there).join()
+            assert "no other process trains in" in here.recv()
+        in_another_process(try_to_train, tmp_path, there).join()
+        assert here.recv() == "trained"
+
+
+def test_processes_that_train_together_share_a_folder(tmp_path, monkeypatch):
+    here, there = FORK.Pipe()
+    with held(tmp_path):
+        monkeypatch.setattr(rank_zero_only, "rank", 1)
+        in_another_process(try_to_train, tmp_path, there).join()
+        assert here.recv() == "trained"
 
 
 def test_a_refused_run_leaves_no_folder_of_its_own(tmp_path):

@@ -111,7 +111,7 @@ def _check_beginning(job: Job) -> None:
     """Refuse a folder in which a run of other settings began."""
     if job.finished or standing(job.folder):
         advice = "repeat the settings it began with, or choose another hydra.sweep.dir"
-        check_beginning(job.folder, job.settings(), job.composed.hydra, advice)
+        check_beginning(job.folder, job.settings(), job.composed.hydra.runtime.choices, advice)
 
 
 def in_sweep(config: Config, sweep: str, folder: Path) -> Config:
