@@ -3,6 +3,7 @@
 import json
 from dataclasses import fields
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import wandb
@@ -53,7 +54,7 @@ def test_publishing_needs_a_key_an_entity_and_the_package(tmp_path, no_account):
     with pytest.raises(ConfigError, match="publish: expected a key for W&B online, found none; run wandb login"):
         dashboard(config)
     assert not Path(config.out).exists()
-    no_account.setattr(panels.importlib, "import_module", lambda name: __import__("no_such_package"))
+    no_account.setattr(panels, "importlib", SimpleNamespace(import_module=lambda _: __import__("no_such_package")))
     no_account.setenv("WANDB_API_KEY", "0" * 40)
     with pytest.raises(ConfigError, match=r"expected the package wandb-workspaces, found none; pip install"):
         dashboard(config)
