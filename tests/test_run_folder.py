@@ -83,6 +83,7 @@ def test_a_run_goes_on_with_what_it_began_with_alone(tmp_path, told, now, messag
     [
         ("resume=run", "hydra.run.dir=run"),
         ("resume=run/checkpoints/membership-last.ckpt", "logger=none", "trainer.threads=1", "name=again"),
+        ("resume=run/checkpoints/membership-last.ckpt", "trainer=cpu", "trainer.accelerator=auto"),
         ("stage1={here}/runs/a",),
         ("stage1=runs/../runs/a/",),
         ("dataset.root=elsewhere",),

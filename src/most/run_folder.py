@@ -51,7 +51,7 @@ def begun(folder: Path, config: DictConfig, goes_on: bool) -> Iterator[None]:
     """
     if goes_on:
         advice = "repeat the settings it began with, or train anew: without resume, in another folder"
-        moved = ("dataset.root",)  # its scans are held against the checkpoint's
+        moved = ("dataset.root", "trainer")  # scans are held against the checkpoint's; machines may be others
         check_beginning(folder, config, HydraConfig.get().runtime.choices, advice, moved)
     with held(folder):
         write_down(folder, config)
