@@ -19,7 +19,7 @@ setup: $(READY)
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(RUN) -m pip install --quiet --upgrade pip
-	$(RUN) -m pip install --quiet --extra-index-url $(TORCH_INDEX) "$(TORCH)"
+	$(RUN) -m pip install --quiet --no-deps --extra-index-url $(TORCH_INDEX) "$(TORCH)"
 	$(RUN) -m pip install --quiet --editable '.[dev]'
 	touch $(READY)
 
