@@ -10,6 +10,7 @@ import yaml
 from most.datasets.taxonomy import Taxonomy
 from most.metrics.segment_sums import DISTANCES, POINTS
 from most.metrics.sightings import VISIBLE
+from most.reports.table import Table
 
 TAXONOMY = Taxonomy.load("semantickitti")
 CLASSES = (1, 2, 6, 9, 13)  # that the sequences have: three things and two of stuff
@@ -111,3 +112,12 @@ def example_sweep(folder: Path, seeds: int = 3) -> Path:
                 stage1=f"track_max,{seed}",
             )  # fmt: skip
     return folder
+
+
+def ours(table: Table) -> dict[str, dict[str, float]]:
+    """The figures of our rows, by title and column."""
+    return {
+        row.title: {key: cell.value for key, cell in row.cells.items() if cell}
+        for block, row in table.rows()
+        if block.ours
+    }
