@@ -14,7 +14,7 @@ LATEX = str.maketrans(
 
 def markdown(table: Table) -> str:
     """A table with a line that parts ours from the paper's."""
-    head = ["", *table.columns, *(["order"] if table.words else []), "seeds"]
+    head = ["", *(["order"] if table.words else []), *table.columns, "seeds"]
     lines = [f"### {table.title}", "", _line(head), _line(["---"] * len(head))]
     for block in table.blocks:
         lines.append(_line([f"**{block.title}**", *[""] * (len(head) - 1)]))
@@ -24,7 +24,7 @@ def markdown(table: Table) -> str:
 
 def latex(table: Table, before: str = "") -> str:
     """A tabular for booktabs; ``before`` tells its label from those of other groups."""
-    head = ["", *table.columns, *(["order"] if table.words else []), "seeds"]
+    head = ["", *(["order"] if table.words else []), *table.columns, "seeds"]
     width = len(head)
     lines = [
         r"\begin{table*}", rf"\caption{{{_tex(table.title)}}}",
@@ -43,25 +43,28 @@ def comma_separated(table: Table) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     figures = [name for column in table.columns for name in (column, f"{column} low", f"{column} high")]
-    writer.writerow(["row", "from", "of", "seeds", *figures, *(["order"] if table.words else [])])
+    writer.writerow(["row", "from", "of", *(["order"] if table.words else []), "seeds", *figures])
     for block, row in table.rows():
         cells = [row.cells.get(column) for column in table.columns]
         values = [part for cell in cells for part in ((cell.value, cell.low, cell.high) if cell else (None,) * 3)]
-        said = [table.words.get(row.title, "") if block.ours else ""] if table.words else []
         whose = ["ours" if block.ours else "paper", block.title]
-        writer.writerow([row.title, *whose, " ".join(map(str, row.seeds)), *values, *said])
+        writer.writerow([row.title, *whose, *_said(table, block, row), " ".join(map(str, row.seeds)), *values])
     return text.getvalue()
 
 
 def _cells(table: Table, block: Block, row: Row) -> list[str]:
-    """A row's texts: title, figures with intervals, what is said, seeds."""
+    """A row's texts: title, what is said, figures with intervals, seeds."""
     texts = []
     for column in table.columns:
         cell = row.cells.get(column)
         interval = between(cell, table.signed)
         texts.append(percent(cell, table.signed) + (f" ({interval})" if interval else ""))
-    said = [table.words.get(row.title, "") if block.ours else ""] if table.words else []
-    return [row.title, *texts, *said, seeds(row)]
+    return [row.title, *_said(table, block, row), *texts, seeds(row)]
+
+
+def _said(table: Table, block: Block, row: Row) -> list[str]:
+    """A cell where the table has words, of ours alone."""
+    return [table.words.get(row.title, "") if block.ours else ""] if table.words else []
 
 
 def _line(cells: list[str]) -> str:

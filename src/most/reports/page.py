@@ -54,7 +54,7 @@ def _chapter(key: str, chapter: Chapter) -> str:
 def _table(key: str, table: Table) -> str:
     words = ['<th scope="col" class="words">order</th>'] if table.words else []
     columns = [f'<th scope="col">{escape(column)}</th>' for column in table.columns]
-    head = "".join(['<th scope="col">row</th>', *columns, *words, '<th scope="col">seeds</th>'])
+    head = "".join(['<th scope="col">row</th>', *words, *columns, '<th scope="col">seeds</th>'])
     body = "\n".join(_block(table, block, len(columns) + len(words) + 2) for block in table.blocks)
     notes = "".join(f'<p class="note">{escape(note)}</p>' for note in table.notes)
     title = escape(table.title)
@@ -72,14 +72,14 @@ def _block(table: Table, block: Block, width: int) -> str:
 
 def _row(table: Table, block: Block, row: Row) -> str:
     cells = [f'<th scope="row">{escape(row.title)}</th>']
+    if table.words:
+        cells.append(f'<td class="words">{escape(table.words.get(row.title, "") if block.ours else "")}</td>')
     for column in table.columns:
         figure = row.cells.get(column)
         interval = between(figure, table.signed)
         small = f"<small>{escape(interval)}</small>" if interval else ""
         whose = ' class="paper"' if column in table.papers else ""
         cells.append(f"<td{whose}>{escape(percent(figure, table.signed))}{small}</td>")
-    if table.words:
-        cells.append(f'<td class="words">{escape(table.words.get(row.title, "") if block.ours else "")}</td>')
     return f"<tr>{''.join(cells)}<td>{escape(seeds(row))}</td></tr>"
 
 

@@ -42,7 +42,7 @@ class Table:
     notes: tuple[str, ...] = ()
     signed: bool = False  # differences, which show + and -
     papers: frozenset[str] = frozenset()  # columns that hold the paper's own figures, beside ours
-    words: dict[str, str] = field(default_factory=dict)  # by row: what is said behind its figures
+    words: dict[str, str] = field(default_factory=dict)  # by row: what is said before its figures
 
     def rows(self) -> Iterator[tuple[Block, Row]]:
         """All rows with their blocks."""
