@@ -25,5 +25,7 @@ def test_two_processes_train_both_stages_and_count_every_sweep_once(tmp_path: Pa
         for run in ("one", "two")
     )
     assert first.keys() == second.keys()
-    for name, value in first.items():
-        torch.testing.assert_close(second[name], value, rtol=0.01, atol=0.002, msg=name)
+    apart = torch.cat([(second[name] - value).flatten().double().abs() for name, value in first.items()])
+    # AdamW moves a weight whose gradient is rounding alone as far as any: single ones may differ by 0.002. Where each
+    # process has batch statistics of its own, the mean is 0.004.
+    assert apart.mean() < 1e-4
