@@ -246,14 +246,8 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     """Read a checkpoint of ours without running any code in it."""
     if path.is_dir():
         kept = sorted([*path.glob("*.ckpt"), *path.glob("checkpoints/*.ckpt")])
-        raise DataError(
-            f"{path}: expected a checkpoint, found a folder; "
-            + (
-                f"name a file in it, such as {kept[-1]}"
-                if kept
-                else "name a file, as checkpoints/STAGE-last.ckpt of a run"
-            )
-        )
+        example = kept[-1] if kept else "checkpoints/STAGE-last.ckpt of a run"
+        raise DataError(f"{path}: expected a checkpoint, found a folder; name a file, such as {example}")
     if not path.is_file():
         raise DataError(f"{path}: expected a checkpoint, found no file; train a model first: python -m most.train")
     try:

@@ -36,9 +36,8 @@ def start(main: Callable[[], None]) -> None:
     try:
         run(main)
     except (HydraException, OmegaConfBaseException) as error:
-        said = str(error).split("Config search path:")[0].splitlines()  # of use to developers alone
-        kept = [line for line in said if _helps(line)]
-        end("\n".join([*kept, *_cause(error)]), 2)
+        lines = str(error).split("Config search path:")[0].splitlines()  # what follows is of use to developers alone
+        end("\n".join([*filter(_helps, lines), *_cause(error)]), 2)
 
 
 def _helps(line: str) -> bool:

@@ -48,7 +48,7 @@ def comma_separated(table: Table) -> str:
         cells = [row.cells.get(column) for column in table.columns]
         values = [part for cell in cells for part in ((cell.value, cell.low, cell.high) if cell else (None,) * 3)]
         whose = ["ours" if block.ours else "paper", block.title]
-        writer.writerow([row.title, *whose, *_said(table, block, row), " ".join(map(str, row.seeds)), *values])
+        writer.writerow([row.title, *whose, *table.said(block, row), " ".join(map(str, row.seeds)), *values])
     return text.getvalue()
 
 
@@ -59,12 +59,7 @@ def _cells(table: Table, block: Block, row: Row) -> list[str]:
         cell = row.cells.get(column)
         interval = between(cell, table.signed)
         texts.append(percent(cell, table.signed) + (f" ({interval})" if interval else ""))
-    return [row.title, *_said(table, block, row), *texts, seeds(row)]
-
-
-def _said(table: Table, block: Block, row: Row) -> list[str]:
-    """A cell where the table has words, of ours alone."""
-    return [table.words.get(row.title, "") if block.ours else ""] if table.words else []
+    return [row.title, *table.said(block, row), *texts, seeds(row)]
 
 
 def _line(cells: list[str]) -> str:

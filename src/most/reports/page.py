@@ -72,8 +72,7 @@ def _block(table: Table, block: Block, width: int) -> str:
 
 def _row(table: Table, block: Block, row: Row) -> str:
     cells = [f'<th scope="row">{escape(row.title)}</th>']
-    if table.words:
-        cells.append(f'<td class="words">{escape(table.words.get(row.title, "") if block.ours else "")}</td>')
+    cells += [f'<td class="words">{escape(text)}</td>' for text in table.said(block, row)]
     for column in table.columns:
         figure = row.cells.get(column)
         interval = between(figure, table.signed)

@@ -48,6 +48,10 @@ class Table:
         """All rows with their blocks."""
         return ((block, row) for block in self.blocks for row in block.rows)
 
+    def said(self, block: Block, row: Row) -> list[str]:
+        """A cell of words before a row's figures, empty for the paper's rows; no cell where the table has no words."""
+        return [self.words.get(row.title, "") if block.ours else ""] if self.words else []
+
 
 def percent(cell: Interval | None, signed: bool = False) -> str:
     """A figure in percent, without its interval."""
