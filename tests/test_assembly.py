@@ -296,11 +296,13 @@ def test_a_dataset_that_the_model_does_not_know_is_refused():
 
 
 def test_a_folder_is_no_checkpoint_and_the_file_to_name_is_said(tmp_path):
-    with pytest.raises(DataError, match=r"expected a checkpoint, found a folder; name a file, as checkpoints/STAGE"):
+    with pytest.raises(
+        DataError, match=r"expected a checkpoint, found a folder; name a file, such as checkpoints/STAGE"
+    ):
         load_trained(tmp_path)
     (tmp_path / "checkpoints").mkdir()
     for name in ("membership-last", "detection-best"):
         (tmp_path / "checkpoints" / f"{name}.ckpt").touch()
     for folder in (tmp_path, tmp_path / "checkpoints"):
-        with pytest.raises(DataError, match=r"found a folder; name a file in it, such as .*/membership-last\.ckpt"):
+        with pytest.raises(DataError, match=r"found a folder; name a file, such as .*/membership-last\.ckpt"):
             load_trained(folder)

@@ -39,14 +39,18 @@ def latex(table: Table, before: str = "") -> str:
 
 
 def comma_separated(table: Table) -> str:
-    """A row for each row: figures as fractions with their intervals, and whose they are."""
+    """A row for each row: figures as fractions with their intervals, and whose they are.
+
+    Ten digits: the last of sixteen depend on how many threads added up.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     figures = [name for column in table.columns for name in (column, f"{column} low", f"{column} high")]
     writer.writerow(["row", "from", "of", *(["order"] if table.words else []), "seeds", *figures])
     for block, row in table.rows():
         cells = [row.cells.get(column) for column in table.columns]
-        values = [part for cell in cells for part in ((cell.value, cell.low, cell.high) if cell else (None,) * 3)]
+        parts = [part for cell in cells for part in ((cell.value, cell.low, cell.high) if cell else (None,) * 3)]
+        values = ["" if part is None else f"{part:.10g}" for part in parts]
         whose = ["ours" if block.ours else "paper", block.title]
         writer.writerow([row.title, *whose, *table.said(block, row), " ".join(map(str, row.seeds)), *values])
     return text.getvalue()
